@@ -1,0 +1,55 @@
+// What the robot can sense and do. Missions use these; which wire a device hangs on does not show
+// here.
+#pragma once
+
+#include <string_view>
+
+#include "hal/task.hpp"
+#include "hal/values.hpp"
+
+namespace hal {
+
+class Drive {
+ public:
+  virtual ~Drive() = default;
+  // Expires in the drive (<= 500 ms) unless repeated. Fails with errc::io_error after a collision.
+  virtual Task<Result<void>> command(Twist twist) = 0;
+  virtual Task<Result<WheelTravel>> next_travel() = 0;
+};
+
+class Imu {
+ public:
+  virtual ~Imu() = default;
+  virtual Task<Result<ImuSample>> next_sample() = 0;
+};
+
+class Gnss {
+ public:
+  virtual ~Gnss() = default;
+  virtual Task<Result<GnssFix>> next_fix() = 0;
+};
+
+// Takes one whole scan while the robot stands still.
+class Scanner {
+ public:
+  virtual ~Scanner() = default;
+  virtual Task<Result<ScanCloud>> scan() = 0;
+};
+
+// Where no robot can drive, a person carries the scanner: asks for it to be set up at `wanted` and
+// returns where it then stands. Fails with errc::address_not_available when nobody can stand there.
+class Placement {
+ public:
+  virtual ~Placement() = default;
+  virtual Task<Result<SurveyedPose>> place(std::string_view region, Pose2 wanted) = 0;
+};
+
+struct Devices {
+  Drive& drive;
+  Imu& imu;
+  Gnss& gnss;
+  Scanner& scanner;
+  Placement& placement;
+};
+
+}  // namespace hal

@@ -1,0 +1,90 @@
+// The robot's vocabulary: plain values that every folder may use. No waiting, no sockets.
+//
+// Frames: W is the site frame (right-handed, x east, y north, z up, metres), S the scanner's own
+// frame (x forward, y left, z up), B the robot's body on the ground below S. T_W_S maps S to W.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <boost/system/result.hpp>
+#include <chrono>
+#include <cstdint>
+#include <vector>
+
+namespace hal {
+
+// An operating error (time-out, bad frame, bus off) is a value. A broken promise in our own code is
+// an assertion.
+template <class T>
+using Result = boost::system::result<T>;
+
+struct RobotClock {};  // Tags time points, so a wall-clock time cannot be passed by mistake.
+using Duration = std::chrono::nanoseconds;
+using Time = std::chrono::time_point<RobotClock, Duration>;
+
+inline double seconds(Duration span) { return std::chrono::duration<double>(span).count(); }
+inline double seconds(Time time) { return seconds(time.time_since_epoch()); }
+inline Duration from_seconds(double span_s) {
+  return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(span_s));
+}
+
+struct Twist {
+  double forward_mps{};
+  double turn_radps{};  // Counter-clockwise positive.
+};
+
+// Where the body stands on the ground, in W. Heading is counter-clockwise from the x axis.
+struct Pose2 {
+  Eigen::Vector2d position_m{0, 0};
+  double heading_rad{};
+};
+
+// How far each side rolled since the previous report.
+struct WheelTravel {
+  Time stamp{};
+  double left_m{};
+  double right_m{};
+};
+
+struct ImuSample {
+  Time stamp{};
+  double yaw_rate_radps{};
+};
+
+// A satellite fix, already in W. sigma_m is the receiver's own 1-sigma claim per axis.
+struct GnssFix {
+  Time stamp{};
+  Eigen::Vector2d position_m{0, 0};
+  double sigma_m{};
+};
+
+// Where a person set up the scanner by hand, as surveyed from known marks.
+struct SurveyedPose {
+  Pose2 pose;
+  double ground_z_m{};
+  double position_sigma_m{};
+  double heading_sigma_rad{};
+};
+
+// The directions of a scan's beams in S: `columns` azimuths from azimuth_first_rad, and in each
+// column `rows` elevations from elevation_first_rad (0 is the horizon, pi/2 the zenith).
+struct ScanPattern {
+  double azimuth_first_rad{};
+  double azimuth_step_rad{};
+  double elevation_first_rad{};
+  double elevation_step_rad{};
+  std::uint32_t columns{};
+  std::uint32_t rows{};
+
+  std::size_t beams() const { return std::size_t{columns} * rows; }
+};
+
+// One 3-D scan. ranges_m[column * rows + row] is the range along that beam in metres; 0 says that
+// nothing came back.
+struct ScanCloud {
+  Time stamp{};
+  ScanPattern pattern;
+  std::vector<float> ranges_m;
+};
+
+}  // namespace hal

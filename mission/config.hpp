@@ -1,0 +1,114 @@
+// A mission as a person writes it: one TOML file that names a robot file and a site folder. Every
+// key has a working default; units are in the key; angles are degrees here and radians in the code.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace mission {
+
+// [body] of the robot file.
+struct BodyConfig {
+  double radius_m = 0.5;
+  double track_m = 0.6;
+  double speed_max_mps = 1.0;
+  double turn_max_degps = 45;
+};
+
+// [scanner] of the robot file.
+struct ScannerConfig {
+  double height_m = 1.8;
+  double range_min_m = 1.0;
+  double range_max_m = 100.0;
+  double grazing_max_deg = 70.0;
+  double fov_deg = 360.0;
+  double azimuth_step_deg = 0.2;
+  double elevation_min_deg = -60.0;
+  double elevation_max_deg = 90.0;
+  double elevation_step_deg = 0.1;
+  double scan_s = 300.0;
+};
+
+// [sim] of the robot file: how the simulated world misbehaves. One-sigma values.
+struct SimConfig {
+  double range_sigma_m = 0.01;
+  double slip_sigma = 0.02;           // Of the travel of each side.
+  double gyro_sigma_degps = 0.05;
+  double gyro_bias_degps = 0.02;
+  double gnss_sigma_m = 0.03;
+  double placement_sigma_m = 0.01;    // A scanner set up by hand on surveyed marks.
+  double placement_heading_sigma_deg = 0.05;
+  double placement_s = 900.0;         // Time to carry it there and set it up.
+};
+
+struct RobotConfig {
+  std::string name = "robot";
+  std::string backend = "sim";        // "sim" (hardware backends come with the drivers)
+  BodyConfig body;
+  ScannerConfig scanner;
+  SimConfig sim;
+};
+
+// [phase1]
+struct Phase1Config {
+  int candidates = 1000;
+  double coverage_goal = 0.98;
+  double gain_min = 0.02;
+  double overlap_min = 0.2;
+};
+
+// [phase2]
+struct Phase2Config {
+  double voxel_m = 1.0;
+  double height_m = 30.0;             // Of the voxel box above the lowest ground.
+  int gain_min_voxels = 100;
+  int views_max = 100;
+  bool carve_no_return = true;
+};
+
+struct MissionConfig {
+  std::string name;                   // Default: the file's name without extension.
+  std::filesystem::path robot_file;   // Key `robot`, relative to the mission file.
+  std::filesystem::path site_folder;  // Key `site`, relative to the mission file.
+  std::uint64_t seed = 1;
+  double margin_m = 30.0;             // From the obstacles to the boundary where the map has none.
+  bool return_home = true;
+  std::map<std::string, std::string> regions;  // [regions] name = "robot" | "manual" | "skip"
+  Phase1Config phase1;
+  Phase2Config phase2;
+  RobotConfig robot;                  // Read from robot_file.
+};
+
+// One thing wrong with a config, as people.md wants it: file, line, column, what, remedy.
+struct ConfigError {
+  std::string file;
+  int line{};
+  int column{};
+  std::string message;
+
+  std::string text() const;  // "file:line:column: message"
+};
+
+struct LoadedMission {
+  MissionConfig config;
+  std::vector<ConfigError> errors;  // Not empty: refuse to start.
+};
+
+// What the command line may replace: --site DIR and --seed N.
+struct Overrides {
+  std::filesystem::path site_folder;
+  bool has_seed{};
+  std::uint64_t seed{};
+};
+
+// Reads the mission file and the robot file it names. Never throws for what a file says.
+LoadedMission load_mission(const std::filesystem::path& file, const Overrides& overrides = {});
+
+// The same from text, for tests and fuzzing; `robot` keys are read from robot_text when not empty.
+LoadedMission parse_mission(std::string_view mission_text, const std::string& mission_name,
+                            std::string_view robot_text, const std::string& robot_name);
+
+}  // namespace mission
