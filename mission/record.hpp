@@ -1,0 +1,100 @@
+// Everything a run decided and did, as values: what the store writes and the report draws.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "hal/values.hpp"
+#include "nav/free_space.hpp"
+#include "nav/site_map.hpp"
+#include "planning/cover.hpp"
+
+namespace mission {
+
+// Voxel counts of the whole map (the columns of the paper's Tables I and II).
+struct VoxelCounts {
+  std::uint64_t seen_empty{};
+  std::uint64_t seen_occupied{};
+  std::uint64_t unseen{};
+  std::uint64_t boundary_unseen{};
+};
+
+struct ScanRecord {
+  int number{};       // 1, 2, ...: scans/0001.ply
+  bool next_best_view{};  // false: a station of Phase I
+  std::string name;   // "inner 3", "NBV 2"
+  std::string area;
+  bool by_hand{};     // Placed by a person.
+  hal::Pose2 planned;
+  hal::Pose2 believed;            // Where the localizer says the scan was taken.
+  double sigma_position_m{};      // Its own claim, 1-sigma.
+  double sigma_heading_rad{};
+  std::optional<hal::Pose2> truth;  // In simulation.
+  double ground_z_m{};
+  double start_s{};   // Mission time.
+  double end_s{};
+  double driven_m{};  // On the way here.
+  std::uint64_t beams{};
+  std::uint64_t points{};
+  std::uint64_t points_outside_box{};
+  double adds_m{};      // Phase I, planned
+  double overlaps_m{};  // Phase I, planned
+  std::uint64_t predicted_voxels{};  // NBV: boundary unseen voxels it should see.
+  std::uint64_t resolved_voxels{};   // Of those, no longer unseen afterwards.
+  VoxelCounts after;
+  std::uint64_t visible_to_next{};   // Best tally after this scan: what the next view would see.
+};
+
+// A station that was planned and not scanned.
+struct DroppedStation {
+  std::string name;
+  std::string area;
+  hal::Pose2 planned;
+  std::string reason;
+};
+
+// Phase I for one free area.
+struct AreaPlan {
+  nav::FreeArea area;
+  std::string mode;  // "robot" or "manual"
+  std::vector<planning::Wall> walls;
+  planning::CoverPlan cover;
+  std::vector<int> tour;  // Order in which cover.stations are visited.
+  double tour_m{};
+  std::vector<std::vector<Eigen::Vector2d>> roadmap_m;  // Polylines of the Voronoi roadmap.
+};
+
+// Simulation only: the run judged by the world that it could not see.
+struct Truth {
+  std::uint64_t surface_visible{};  // Surface voxels visible from some reachable ground cell.
+  std::uint64_t surface_seen{};     // Of those, seen-occupied.
+  double position_error_max_m{};    // Believed against true pose, over all scans.
+  double position_error_rms_m{};
+  double heading_error_max_rad{};
+  double nees_mean{};               // 3 expected when the covariance is honest.
+};
+
+struct RunRecord {
+  std::string mission;
+  std::string site;
+  std::string robot;
+  std::uint64_t seed{};
+  nav::SiteMap map;
+  std::vector<nav::Repair> repairs;
+  std::vector<std::string> notes;  // What the operator should know, in order.
+  std::vector<AreaPlan> plans;
+  std::vector<ScanRecord> scans;
+  std::vector<DroppedStation> dropped;
+  std::vector<std::vector<Eigen::Vector2d>> driven_m;  // Believed tracks, one per leg.
+  double voxel_m{};
+  int gain_min_voxels{};
+  double mission_s{};
+  double driven_total_m{};
+  std::string end;  // Why it ended, in words.
+  bool completed{};
+  std::optional<Truth> truth;
+};
+
+}  // namespace mission
