@@ -1,0 +1,98 @@
+#include "sim/sim_clock.hpp"
+
+#include <algorithm>
+#include <boost/asio/associated_cancellation_slot.hpp>
+#include <boost/asio/associated_executor.hpp>
+#include <boost/asio/async_result.hpp>
+#include <boost/asio/error.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <cstddef>
+#include <new>
+
+namespace sim {
+
+using boost::system::error_code;
+
+// One waiting coroutine. It lives in the frame of that coroutine's sleep_until, which its handler
+// keeps alive: whoever finishes it must take the handler out first.
+struct SimClock::Sleeper {
+  enum class End { call, drop };
+
+  alignas(std::max_align_t) std::byte handler[64];
+  void (*finish)(Sleeper& self, End end, error_code ec) = nullptr;
+};
+
+template <class Handler>
+void SimClock::enlist(Sleeper& sleeper, hal::Time wake, Handler handler) {
+  static_assert(sizeof(Handler) <= sizeof(sleeper.handler));
+  const Key key{std::max(wake, now_), asked_++};
+  const auto slot = boost::asio::get_associated_cancellation_slot(handler);
+  new (sleeper.handler) Handler(std::move(handler));
+  sleeper.finish = [](Sleeper& self, Sleeper::End end, error_code ec) {
+    auto* held = std::launder(reinterpret_cast<Handler*>(self.handler));
+    Handler taken(std::move(*held));
+    held->~Handler();
+    if (end == Sleeper::End::drop) return;  // Destroying it unwinds the coroutine.
+    if (auto own = boost::asio::get_associated_cancellation_slot(taken); own.is_connected())
+      own.clear();
+    const auto executor = boost::asio::get_associated_executor(taken);
+    boost::asio::post(executor,
+                      [handler = std::move(taken), ec]() mutable { std::move(handler)(ec); });
+  };
+  sleepers_.emplace_hint(sleepers_.end(), key, &sleeper);
+  if (slot.is_connected())
+    boost::asio::cancellation_slot(slot).assign([this, key](boost::asio::cancellation_type type) {
+      if (type != boost::asio::cancellation_type::none) cancel(key);
+    });
+}
+
+hal::Task<void> SimClock::sleep_until(hal::Time wake) {
+  Sleeper sleeper;
+  co_await boost::asio::async_initiate<const boost::asio::use_awaitable_t<>&, void(error_code)>(
+      [&](auto handler) { enlist(sleeper, wake, std::move(handler)); }, boost::asio::use_awaitable);
+}
+
+SimClock::~SimClock() {
+  while (!sleepers_.empty()) {
+    Sleeper* const last = sleepers_.begin()->second;
+    sleepers_.erase(sleepers_.begin());
+    last->finish(*last, Sleeper::End::drop, {});
+  }
+}
+
+void SimClock::cancel(const Key& key) {
+  const auto found = sleepers_.find(key);
+  if (found == sleepers_.end()) return;  // It woke in the meantime.
+  Sleeper* const sleeper = found->second;
+  sleepers_.erase(found);
+  sleeper->finish(*sleeper, Sleeper::End::call, boost::asio::error::operation_aborted);
+}
+
+void SimClock::wake_first() {
+  const auto [key, sleeper] = *sleepers_.begin();
+  sleepers_.erase(sleepers_.begin());
+  now_ = key.first;
+  sleeper->finish(*sleeper, Sleeper::End::call, {});
+}
+
+void SimClock::run_ready() {
+  do io_.restart();
+  while (io_.poll() > 0);
+}
+
+void SimClock::run_until(hal::Time end) {
+  for (run_ready(); !sleepers_.empty() && sleepers_.begin()->first.first <= end; run_ready())
+    wake_first();
+  now_ = std::max(now_, end);
+}
+
+bool SimClock::run(const std::function<bool()>& done) {
+  for (run_ready(); !done(); run_ready()) {
+    if (sleepers_.empty()) return false;
+    wake_first();
+  }
+  return true;
+}
+
+}  // namespace sim
