@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace mission {
@@ -35,18 +36,18 @@ struct ScannerConfig {
 // [sim] of the robot file: how the simulated world misbehaves. One-sigma values.
 struct SimConfig {
   double range_sigma_m = 0.01;
-  double slip_sigma = 0.02;           // Of the travel of each side.
+  double slip_sigma = 0.02;  // Of the travel of each side.
   double gyro_sigma_degps = 0.05;
   double gyro_bias_degps = 0.02;
   double gnss_sigma_m = 0.03;
-  double placement_sigma_m = 0.01;    // A scanner set up by hand on surveyed marks.
+  double placement_sigma_m = 0.01;  // A scanner set up by hand on surveyed marks.
   double placement_heading_sigma_deg = 0.05;
-  double placement_s = 900.0;         // Time to carry it there and set it up.
+  double placement_s = 900.0;  // Time to carry it there and set it up.
 };
 
 struct RobotConfig {
   std::string name = "robot";
-  std::string backend = "sim";        // "sim" (hardware backends come with the drivers)
+  std::string backend = "sim";  // "sim" (hardware backends come with the drivers)
   BodyConfig body;
   ScannerConfig scanner;
   SimConfig sim;
@@ -63,10 +64,17 @@ struct Phase1Config {
 // [phase2]
 struct Phase2Config {
   double voxel_m = 1.0;
-  double height_m = 30.0;             // Of the voxel box above the lowest ground.
+  double height_m = 30.0;  // Of the voxel box above the lowest ground.
   int gain_min_voxels = 100;
   int views_max = 100;
   bool carve_no_return = true;
+};
+
+// Where a key was written. Line and column count from 1; 0 says "the whole file" (or no file).
+struct ConfigPlace {
+  std::string file;
+  int line{};
+  int column{};
 };
 
 struct MissionConfig {
@@ -74,12 +82,17 @@ struct MissionConfig {
   std::filesystem::path robot_file;   // Key `robot`, relative to the mission file.
   std::filesystem::path site_folder;  // Key `site`, relative to the mission file.
   std::uint64_t seed = 1;
-  double margin_m = 30.0;             // From the obstacles to the boundary where the map has none.
+  double margin_m = 30.0;  // From the obstacles to the boundary where the map has none.
   bool return_home = true;
   std::map<std::string, std::string> regions;  // [regions] name = "robot" | "manual" | "skip"
   Phase1Config phase1;
   Phase2Config phase2;
-  RobotConfig robot;                  // Read from robot_file.
+  RobotConfig robot;  // Read from robot_file.
+
+  // Where each value that is not a default came from, by the path of the member it set: "seed",
+  // "robot" and "site" (the keys), "phase2.voxel_m", "regions.moat", "robot.scanner.range_max_m".
+  std::map<std::string, ConfigPlace> written;
+  std::string file;  // The mission file's name, for messages.
 };
 
 // One thing wrong with a config, as people.md wants it: file, line, column, what, remedy.
@@ -89,7 +102,7 @@ struct ConfigError {
   int column{};
   std::string message;
 
-  std::string text() const;  // "file:line:column: message"
+  std::string text() const;  // "file:line:column: message"; without line 0
 };
 
 struct LoadedMission {
@@ -104,10 +117,13 @@ struct Overrides {
   std::uint64_t seed{};
 };
 
-// Reads the mission file and the robot file it names. Never throws for what a file says.
+// Reads the mission file and the robot file it names. Never throws for what a file says. Errors are
+// sorted: mission file, robot file, command line; by line and column within. Paths in the result
+// are relative to the working folder (or absolute), not to the file that named them.
 LoadedMission load_mission(const std::filesystem::path& file, const Overrides& overrides = {});
 
 // The same from text, for tests and fuzzing; `robot` keys are read from robot_text when not empty.
+// Looks at no disk: files and folders that the keys name need not exist, nor must a site be named.
 LoadedMission parse_mission(std::string_view mission_text, const std::string& mission_name,
                             std::string_view robot_text, const std::string& robot_name);
 

@@ -1,0 +1,263 @@
+#include "mission/config_schema.hpp"
+
+#include <fmt/format.h>
+
+namespace mission {
+namespace {
+
+constexpr double kSeedMax = 9223372036854775807.0;  // The largest whole number TOML can write.
+
+// Builds the key tables of one struct: `part` finds the struct in the mission's config.
+template <class Part>
+class Keys {
+ public:
+  using Find = Part& (*)(MissionConfig&);
+  explicit Keys(Find part) : part_(part) {}
+
+  // A number, from min to max, ends included.
+  template <class T>
+  KeySpec number(std::string key, T Part::*member, double min, double max, std::string unit,
+                 std::string help) const {
+    return {std::move(key), slot(member), min, max, {}, std::move(unit), std::move(help)};
+  }
+  // A flag, a path, or text; text may be limited to some choices.
+  template <class T>
+  KeySpec other(std::string key, T Part::*member, std::string help,
+                std::vector<std::string> choices = {}) const {
+    return {std::move(key), slot(member), 0, 0, std::move(choices), "", std::move(help)};
+  }
+
+ private:
+  template <class T>
+  std::function<Slot(MissionConfig&)> slot(T Part::*member) const {
+    return
+        [part = part_, member](MissionConfig& config) -> Slot { return &(part(config).*member); };
+  }
+  Find part_;
+};
+
+SectionSpec mission_section() {
+  using C = MissionConfig;
+  const Keys<C> keys{[](C& c) -> C& { return c; }};
+  return {ConfigFile::mission,
+          "",
+          "What to survey, and with what.",
+          {keys.other("name", &C::name, "What reports call the mission; default: the file's name"),
+           keys.other("robot", &C::robot_file,
+                      "Robot file, relative to this file; without one, the robot keys' defaults"),
+           keys.other("site", &C::site_folder,
+                      "Folder with footprint.geojson, relative to this file; or give `--site DIR`"),
+           keys.number("seed", &C::seed, 0, kSeedMax, "",
+                       "Of every random choice: the same seed gives the same run"),
+           keys.number("margin_m", &C::margin_m, 0, 10'000, "m",
+                       "From the obstacles to the boundary, where the map draws no boundary"),
+           keys.other("return_home", &C::return_home, "Drive back to the start at the end")},
+          {}};
+}
+
+SectionSpec phase1_section() {
+  using P = Phase1Config;
+  const Keys<P> keys{[](MissionConfig& c) -> P& { return c.phase1; }};
+  return {ConfigFile::mission,
+          "phase1",
+          "The plan from the 2-D map (Algorithm 1).",
+          {keys.number("candidates", &P::candidates, 1, 1'000'000, "",
+                       "Random stations to choose from, in each area"),
+           keys.number("coverage_goal", &P::coverage_goal, 0.01, 1, "share",
+                       "Of the target wall that any candidate can see; stop there"),
+           keys.number("gain_min", &P::gain_min, 0, 1, "share",
+                       "Of the target wall; stop when the next station adds less"),
+           keys.number("overlap_min", &P::overlap_min, 0, 0.95, "share",
+                       "Of what a station sees that earlier stations must see too")},
+          {}};
+}
+
+SectionSpec phase2_section() {
+  using P = Phase2Config;
+  const Keys<P> keys{[](MissionConfig& c) -> P& { return c.phase2; }};
+  return {ConfigFile::mission,
+          "phase2",
+          "Next best views in the voxel map (Algorithm 2).",
+          {keys.number("voxel_m", &P::voxel_m, 0.02, 20, "m", "Edge of a voxel"),
+           keys.number("height_m", &P::height_m, 0.5, 500, "m",
+                       "Of the voxel box above the lowest ground"),
+           keys.number("gain_min_voxels", &P::gain_min_voxels, 1, 1e9, "voxels",
+                       "Stop when no view would see this many boundary unseen voxels"),
+           keys.number("views_max", &P::views_max, 0, 100'000, "",
+                       "At most this many next best views; 0: Phase I only"),
+           keys.other("carve_no_return", &P::carve_no_return,
+                      "Beams that hit nothing show empty space up to the maximum range")},
+          {}};
+}
+
+SectionSpec regions_section() {
+  return {ConfigFile::mission,
+          "regions",
+          "Who scans which region of the map: `name = \"robot\"`, `\"manual\"` (a person carries "
+          "the scanner there) or `\"skip\"`. A region that is not named is scanned by the robot if "
+          "it starts there, and by hand otherwise.",
+          {},
+          {"robot", "manual", "skip"}};
+}
+
+SectionSpec robot_section() {
+  using R = RobotConfig;
+  const Keys<R> keys{[](MissionConfig& c) -> R& { return c.robot; }};
+  return {ConfigFile::robot,
+          "",
+          "Which robot.",
+          {keys.other("name", &R::name, "What reports call the robot"),
+           keys.other("backend", &R::backend, "What carries it out", {"sim"})},
+          {}};
+}
+
+SectionSpec body_section() {
+  using B = BodyConfig;
+  const Keys<B> keys{[](MissionConfig& c) -> B& { return c.robot.body; }};
+  return {ConfigFile::robot,
+          "body",
+          "Its size and speed.",
+          {keys.number("radius_m", &B::radius_m, 0.05, 5, "m",
+                       "Of the circle that holds the whole robot"),
+           keys.number("track_m", &B::track_m, 0.05, 5, "m", "Between left and right wheels"),
+           keys.number("speed_max_mps", &B::speed_max_mps, 0.01, 10, "m/s", "Driving straight"),
+           keys.number("turn_max_degps", &B::turn_max_degps, 1, 360, "deg/s", "Turning")},
+          {}};
+}
+
+SectionSpec scanner_section() {
+  using S = ScannerConfig;
+  const Keys<S> keys{[](MissionConfig& c) -> S& { return c.robot.scanner; }};
+  return {ConfigFile::robot,
+          "scanner",
+          "What one scan sees.",
+          {keys.number("height_m", &S::height_m, 0.05, 20, "m", "Above the ground"),
+           keys.number("range_min_m", &S::range_min_m, 0, 100, "m", "Nothing nearer is measured"),
+           keys.number("range_max_m", &S::range_max_m, 0.5, 2000, "m", "Nothing farther"),
+           keys.number("grazing_max_deg", &S::grazing_max_deg, 1, 90, "deg",
+                       "Largest angle between beam and surface normal that gives good points"),
+           keys.number("fov_deg", &S::fov_deg, 1, 360, "deg", "Horizontal, centred ahead"),
+           keys.number("azimuth_step_deg", &S::azimuth_step_deg, 0.005, 10, "deg",
+                       "Between neighbouring columns of beams"),
+           keys.number("elevation_min_deg", &S::elevation_min_deg, -90, 90, "deg",
+                       "Lowest beam; 0 is the horizon"),
+           keys.number("elevation_max_deg", &S::elevation_max_deg, -90, 90, "deg", "Highest beam"),
+           keys.number("elevation_step_deg", &S::elevation_step_deg, 0.005, 10, "deg",
+                       "Between neighbouring beams of a column"),
+           keys.number("scan_s", &S::scan_s, 0, 86'400, "s", "Time one scan takes")},
+          {}};
+}
+
+SectionSpec sim_section() {
+  using S = SimConfig;
+  const Keys<S> keys{[](MissionConfig& c) -> S& { return c.robot.sim; }};
+  return {ConfigFile::robot,
+          "sim",
+          "How the simulated world misbehaves; one-sigma values.",
+          {keys.number("range_sigma_m", &S::range_sigma_m, 0, 1, "m", "Noise of a range"),
+           keys.number("slip_sigma", &S::slip_sigma, 0, 0.5, "share",
+                       "Of the travel of each side that the wheels slip"),
+           keys.number("gyro_sigma_degps", &S::gyro_sigma_degps, 0, 10, "deg/s",
+                       "Noise of a gyro sample"),
+           keys.number("gyro_bias_degps", &S::gyro_bias_degps, 0, 10, "deg/s", "Bias of the gyro"),
+           keys.number("gnss_sigma_m", &S::gnss_sigma_m, 0, 100, "m",
+                       "Noise of a satellite fix, per axis"),
+           keys.number("placement_sigma_m", &S::placement_sigma_m, 0, 10, "m",
+                       "Survey error of a scanner set up by hand"),
+           keys.number("placement_heading_sigma_deg", &S::placement_heading_sigma_deg, 0, 45, "deg",
+                       "The same for its heading"),
+           keys.number("placement_s", &S::placement_s, 0, 86'400, "s",
+                       "Time to carry the scanner to a station and set it up")},
+          {}};
+}
+
+std::string value_text(const Slot& slot) {
+  const auto text = [](const auto* value) -> std::string {
+    using T = std::remove_cvref_t<decltype(*value)>;
+    if constexpr (std::is_same_v<T, std::filesystem::path>)
+      return value->generic_string();
+    else
+      return fmt::format("{}", *value);
+  };
+  return std::visit(text, slot);
+}
+
+std::string type_text(const KeySpec& spec, const Slot& slot) {
+  if (std::holds_alternative<bool*>(slot)) return "`true` or `false`";
+  if (std::holds_alternative<std::filesystem::path*>(slot)) return "path";
+  if (std::holds_alternative<std::string*>(slot)) {
+    std::string text;
+    for (const auto& choice : spec.choices)
+      text += (text.empty() ? "`\"" : " or `\"") + choice + "\"`";
+    return text.empty() ? "text" : text;
+  }
+  const bool whole = !std::holds_alternative<double*>(slot);
+  if (spec.max >= kSeedMax) return fmt::format("whole number, {} or more", spec.min);
+  return fmt::format("{}{} to {}", whole ? "whole number, " : "", spec.min, spec.max);
+}
+
+std::string heading(const SectionSpec& section) {
+  if (!section.name.empty()) return fmt::format("### `[{}]`\n\n{}\n\n", section.name, section.help);
+  const std::string title = section.file == ConfigFile::mission ? "Mission file" : "Robot file";
+  return fmt::format("## {}\n\n{} These keys stand above the first `[table]`.\n\n", title,
+                     section.help);
+}
+
+}  // namespace
+
+std::string_view name(ConfigFile file) {
+  return file == ConfigFile::mission ? "mission" : "robot";
+}
+
+const std::vector<SectionSpec>& config_schema() {
+  static const std::vector<SectionSpec> schema{
+      mission_section(), phase1_section(), phase2_section(),  regions_section(),
+      robot_section(),   body_section(),   scanner_section(), sim_section()};
+  return schema;
+}
+
+std::string member_path(const SectionSpec& section, std::string_view key) {
+  std::string path = section.file == ConfigFile::robot ? "robot." : "";
+  if (!section.name.empty()) path += section.name + ".";
+  return path.append(key);
+}
+
+std::string config_reference() {
+  MissionConfig defaults;
+  std::string text;
+  for (const auto& section : config_schema()) {
+    text += heading(section);
+    if (section.keys.empty()) continue;
+    text += "| key | unit | allowed | default | meaning |\n|---|---|---|---|---|\n";
+    for (const auto& spec : section.keys) {
+      const Slot slot = spec.slot(defaults);
+      const std::string value = value_text(slot);
+      text += fmt::format("| `{}` | {} | {} | {} | {} |\n", spec.key, spec.unit,
+                          type_text(spec, slot), value.empty() ? "" : "`" + value + "`", spec.help);
+    }
+    text += "\n";
+  }
+  while (text.ends_with("\n\n")) text.pop_back();
+  return text;
+}
+
+std::vector<EffectiveValue> effective_values(const MissionConfig& config) {
+  MissionConfig copy = config;  // Slots point into something that may be written.
+  std::vector<EffectiveValue> values;
+  const auto origin = [&](const std::string& path) -> std::string {
+    const auto found = config.written.find(path);
+    if (found == config.written.end()) return "default";
+    const auto& place = found->second;
+    return place.line > 0 ? fmt::format("{}:{}", place.file, place.line) : place.file;
+  };
+  for (const auto& section : config_schema())
+    for (const auto& spec : section.keys) {
+      const auto path = member_path(section, spec.key);
+      values.push_back({path, value_text(spec.slot(copy)), spec.unit, origin(path)});
+    }
+  for (const auto& [region, mode] : config.regions)
+    values.push_back({"regions." + region, mode, "", origin("regions." + region)});
+  return values;
+}
+
+}  // namespace mission
