@@ -1,0 +1,68 @@
+// The folder a run leaves behind.
+//
+//   scans/0001.ply ...  every scan, with its pose        summary.json  the run in numbers
+//   cloud.ply           all scans merged and thinned     report.html   the run for people
+//   map.ot              the voxel map, for octovis       decisions.jsonl  one line per decision
+//
+// Files are written whole: see write_file. decisions.jsonl grows line by line; a line is handed to
+// the operating system before decide() returns (it survives the program, and from finish() on a
+// power cut). It holds no wall-clock times: two runs with the same seed write the same bytes.
+#pragma once
+
+#include <boost/json/object.hpp>
+#include <filesystem>
+#include <functional>
+#include <string_view>
+#include <vector>
+
+#include "mission/files.hpp"
+#include "mission/octomap_io.hpp"
+#include "mission/ply.hpp"
+
+namespace mission {
+
+class RunStore {
+ public:
+  // Opens `folder` for one run; makes it, and its parents, when it is not there. Fails, with what
+  // to do about it in the error's text, and without having changed anything,
+  //   - when it is not empty and no earlier run lies in it (no decisions.jsonl),
+  //   - when another process is writing a run into it.
+  // An earlier run in it is replaced: its products (the files named above, nothing else) are
+  // removed here, the report first, so that the folder never shows a mixture of two runs.
+  static FileResult<RunStore> open(const std::filesystem::path& folder);
+
+  RunStore(RunStore&& other) noexcept;
+  RunStore& operator=(RunStore&& other) noexcept;
+  ~RunStore();
+
+  // Whether open() found and removed an earlier run: worth a note to the operator.
+  bool replaced() const { return replaced_; }
+
+  const std::filesystem::path& folder() const { return folder_; }
+  std::filesystem::path scan_path(int number) const;  // scans/0001.ply
+  std::filesystem::path report_path() const { return folder_ / "report.html"; }
+
+  // Appends one line to decisions.jsonl; keys stay in the order given.
+  FileResult<void> decide(const boost::json::object& decision);
+
+  FileResult<void> save_scan(const std::vector<Eigen::Vector3f>& W_points_m,
+                             const Eigen::Isometry3d& T_W_S, const ScanInfo& info);
+  FileResult<void> save_cloud(const CloudMerger& cloud);
+  FileResult<OctomapWritten> save_map(
+      const planning::VoxelGrid& grid,
+      const std::function<planning::VoxelState(planning::Voxel)>& state_at);
+  FileResult<void> save_summary(const boost::json::object& summary);
+  FileResult<void> save_report(std::string_view html);
+
+  // Flushes decisions.jsonl to the disk.
+  FileResult<void> finish();
+
+ private:
+  RunStore() = default;
+
+  std::filesystem::path folder_;
+  int decisions_fd_ = -1;
+  bool replaced_ = false;
+};
+
+}  // namespace mission
