@@ -2,7 +2,10 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "hal/values.hpp"
@@ -25,7 +28,8 @@ struct VoxelGrid {
   int nx{}, ny{}, nz{};
 
   std::size_t size() const {
-    return static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny) * static_cast<std::size_t>(nz);
+    return static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny) *
+           static_cast<std::size_t>(nz);
   }
   bool contains(Voxel v) const {
     return v.x >= 0 && v.y >= 0 && v.z >= 0 && v.x < nx && v.y < ny && v.z < nz;
@@ -40,5 +44,119 @@ struct VoxelGrid {
             static_cast<int>(std::floor(q.z()))};
   }
 };
+
+struct VoxelCounts {
+  std::size_t unseen{};
+  std::size_t seen_empty{};
+  std::size_t seen_occupied{};
+
+  auto operator<=>(const VoxelCounts&) const = default;
+};
+
+// How a scan is believed.
+struct InsertConfig {
+  double range_min_m = 1.0;
+  double range_max_m = 100.0;
+  // A beam without return has met nothing up to range_max_m. false: only data points carve.
+  bool carve_no_return = true;
+  // See trusted_no_returns() in voxel_beams.hpp. 0: every beam without return is believed.
+  int no_return_window = 2;
+  // The ground where it is known and flat: a beam without return that points down at it was lost on
+  // the ground and did not pass through. It is carved only down to the top of the voxel layer that
+  // holds this height, so that no ground voxel becomes seen-empty by a drop-out.
+  std::optional<double> ground_z_m;
+  int threads = 1;  // The result does not depend on it.
+};
+
+// What one scan did.
+struct InsertReport {
+  std::size_t returns{};              // Within range.
+  std::size_t returns_outside{};      // Of these, with the point outside the box.
+  std::size_t returns_too_near{};     // Below range_min_m: ignored.
+  std::size_t returns_too_far{};      // Above range_max_m: ignored.
+  std::size_t returns_invalid{};      // Negative or not a number: ignored.
+  std::size_t no_returns{};           // Beams from which nothing came back.
+  std::size_t no_returns_carved{};    // Of these, carved at least part of the way.
+  int layers_needed{};                // nz with which no return lies above the box (see grow_z).
+  std::size_t new_occupied{};         // Voxels that became seen-occupied,
+  std::size_t emptied_to_occupied{};  // of these, seen-empty before.
+  std::size_t new_empty{};            // Voxels that became seen-empty.
+
+  bool operator==(const InsertReport&) const = default;
+};
+
+// Two bits per voxel. Rows run along x and are padded to 64 bits, padding 0.
+class VoxelMap {
+ public:
+  // All unseen. Throws std::invalid_argument for a box without voxels or beyond 2^17 per axis.
+  explicit VoxelMap(const VoxelGrid& grid);
+
+  const VoxelGrid& grid() const { return grid_; }
+  // Outside the box: unseen.
+  VoxelState at(Voxel v) const;
+  VoxelCounts counts() const;
+
+  // Puts one scan into the map, by the rule of the paper: every voxel that holds a return becomes
+  // seen-occupied for good; then every unseen voxel that a beam crosses on its way, from the
+  // scanner's own voxel to the beam's end, becomes seen-empty. All returns of the scan come
+  // first, so neither the order of beams nor the number of threads matters. The paths are exact
+  // segments between end points on a lattice of 1/1024 voxel (voxel_beams.hpp); what lies outside
+  // the box is as if walked and forgotten. T_W_S is the scanner's pose at the scan.
+  // Throws std::invalid_argument for what cannot be a scan of this site (sizes, steps, limits).
+  InsertReport insert(const hal::ScanCloud& scan, const Eigen::Isometry3d& T_W_S,
+                      const InsertConfig& config);
+
+  // More layers on top, all unseen; the states below are kept. After a scan that saw higher than
+  // the box, grow_z(report.layers_needed) and insert() of the same scan again give what the higher
+  // box would have given. Throws std::invalid_argument when nz is less than now.
+  void grow_z(int nz);
+
+  // For maps that come from elsewhere (files, tests). v must be inside the box.
+  void set(Voxel v, VoxelState state);
+
+  int row_words() const { return row_words_; }
+  std::span<const std::uint64_t> occupied_row(int y, int z) const { return row(occupied_, y, z); }
+  std::span<const std::uint64_t> empty_row(int y, int z) const { return row(empty_, y, z); }
+
+  bool operator==(const VoxelMap& other) const {
+    return occupied_ == other.occupied_ && empty_ == other.empty_;
+  }
+
+ private:
+  std::span<const std::uint64_t> row(const std::vector<std::uint64_t>& bits, int y, int z) const {
+    return {bits.data() + row_begin(y, z), static_cast<std::size_t>(row_words_)};
+  }
+  std::size_t row_begin(int y, int z) const {
+    return (static_cast<std::size_t>(z) * static_cast<std::size_t>(grid_.ny) +
+            static_cast<std::size_t>(y)) *
+           static_cast<std::size_t>(row_words_);
+  }
+
+  VoxelGrid grid_;
+  int row_words_{};
+  std::vector<std::uint64_t> occupied_;
+  std::vector<std::uint64_t> empty_;  // Never both.
+};
+
+// The six faces of a voxel, as bits.
+enum Face : std::uint8_t {
+  kFaceXMinus = 1,
+  kFaceXPlus = 2,
+  kFaceYMinus = 4,
+  kFaceYPlus = 8,
+  kFaceZMinus = 16,
+  kFaceZPlus = 32,
+};
+
+// An unseen voxel with a seen-empty neighbour behind each of `faces` (at least one).
+struct BoundaryVoxel {
+  Voxel v;
+  std::uint8_t faces{};
+
+  bool operator==(const BoundaryVoxel&) const = default;
+};
+
+// All of them (the set U of Algorithm 2), ordered by z, then y, then x.
+std::vector<BoundaryVoxel> boundary_unseen(const VoxelMap& map);
 
 }  // namespace planning
