@@ -1,0 +1,24 @@
+// Whether a mission fits its site, before anything starts.
+#pragma once
+
+#include <vector>
+
+#include "mission/config.hpp"
+#include "nav/free_space.hpp"
+#include "nav/site_map.hpp"
+
+namespace mission {
+
+// Parts of a region smaller than this are no place to survey from.
+inline constexpr double kAreaMinM2 = 1.0;
+
+// More voxels than this do not fit the memory that a mission may use.
+inline constexpr double kVoxelsMax = 400e6;
+
+// What stands between this mission and this site: errors of the map, regions in the mission that
+// the map lacks or where nobody can stand, a start outside the free space, too many voxels. `areas`
+// is free_areas(site.map, config.robot.body.radius_m, kAreaMinM2). Pure.
+std::vector<ConfigError> check_site(const MissionConfig& config, const nav::RepairedSite& site,
+                                    const std::vector<nav::FreeArea>& areas);
+
+}  // namespace mission
