@@ -14,6 +14,8 @@ constexpr double kTurnOutlier = 5;      // Sigmas: a robot that turns although i
 constexpr double kTurnFloor_radps = 0.002;
 constexpr double kWheelTurnError = 0.05;  // Skid steering turns less than its wheels say.
 constexpr double kFixLagMax_s = 0.5;
+constexpr double kFixSigmaMin_m = 0.001;
+constexpr double kTravelSigma_m = 0.001;  // Per square root of a metre: encoder ticks, bumps.
 
 double wrapped(double angle_rad) {
   return std::remainder(angle_rad, 2 * std::numbers::pi);
@@ -119,6 +121,9 @@ void Localizer::move(const hal::WheelTravel& travel, const Turn& turn, double by
   const Eigen::Vector2d sideways(-s, c);
   covariance_.topLeftCorner<2, 2>() +=
       std::pow(config_.side_slip_sigma, 2) * std::abs(forward_m) * sideways * sideways.transpose();
+  covariance_.topLeftCorner<2, 2>() += std::pow(kTravelSigma_m, 2) *
+                                       (std::abs(travel.left_m) + std::abs(travel.right_m)) / 2 *
+                                       Eigen::Matrix2d::Identity();
   odometer_m_ += std::abs(forward_m);
   forget_slip(kSlipLeft, travel.left_m);
   forget_slip(kSlipRight, travel.right_m);
@@ -145,11 +150,11 @@ void Localizer::wander(hal::Time now) {
 }
 
 Gate Localizer::correct(const hal::GnssFix& fix) {
-  const bool usable = fix.position_m.allFinite() && std::isfinite(fix.sigma_m) && fix.sigma_m > 0;
+  const bool usable = fix.position_m.allFinite() && std::isfinite(fix.sigma_m) && fix.sigma_m >= 0;
   if (!usable || (fix_time_ && fix.stamp < *fix_time_)) return Gate::rejected;
   wander(fix.stamp);
 
-  const double variance = fix.sigma_m * fix.sigma_m;
+  const double variance = std::pow(std::max(fix.sigma_m, kFixSigmaMin_m), 2);
   const double white = (1 - config_.gnss_wander_share) * variance;
   Eigen::Matrix<double, 2, kSize> H = Eigen::Matrix<double, 2, kSize>::Zero();
   H(0, kX) = H(1, kY) = 1;

@@ -34,7 +34,7 @@ struct LocalizerConfig {
 // What became of a fix.
 enum class Gate {
   accepted,
-  rejected,  // Outlier, not finite, or without a positive sigma: the pose did not change.
+  rejected,  // Outlier, older than the last, not finite, sigma below 0: the pose did not change.
   reset      // Accepted after widening the covariance: the filter had been lost.
 };
 

@@ -312,12 +312,24 @@ TEST(Localizer, UselessReportsChangeNothing) {
   const double nan = std::nan("");
   const hal::Time at{std::chrono::seconds(1)};
   EXPECT_EQ(filter.correct({at, {nan, 0}, 0.03}), nav::Gate::rejected);
-  EXPECT_EQ(filter.correct({at, {0, 0}, 0}), nav::Gate::rejected);
+  EXPECT_EQ(filter.correct({at, {0, 0}, -0.03}), nav::Gate::rejected);
   EXPECT_EQ(filter.correct({at, {0, 0}, nan}), nav::Gate::rejected);
   filter.predict(hal::ImuSample{at, nan});
   filter.predict(hal::WheelTravel{at, nan, 1});
   EXPECT_EQ(filter.pose().position_m, Eigen::Vector2d(0, 0));
   EXPECT_TRUE(filter.covariance().isApprox(start_covariance()));
+}
+
+TEST(Localizer, PerfectDevicesGiveAPerfectPose) {
+  Errors errors;
+  errors.gyro_sigma_radps = errors.slip_sigma = errors.gnss_sigma_m = 0;
+  nav::LocalizerConfig config;
+  config.gyro_sigma_radps = config.slip_sigma = 0;
+  const auto figures = monte_carlo(errors, config, 5);
+  EXPECT_LT(figures.position_p95_m, 0.01);
+  EXPECT_LT(figures.heading_rms_rad, 0.1 * kDeg);
+  EXPECT_LT(figures.nees_mean, 10);
+  EXPECT_EQ(figures.rejected, 0);
 }
 
 TEST(Localizer, CovarianceStaysSymmetricAndPositive) {
