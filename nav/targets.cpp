@@ -20,9 +20,10 @@ struct Beside {
       if (start < low || start > high) to = from - 1;
       return;
     }
-    const auto [first, last] = std::minmax((low - start) / slope, (high - start) / slope);
-    from = std::max(from, first);
-    to = std::min(to, last);
+    const double one = (low - start) / slope;
+    const double other = (high - start) / slope;
+    from = std::max(from, std::min(one, other));
+    to = std::min(to, std::max(one, other));
   }
 };
 
