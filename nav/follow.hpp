@@ -28,7 +28,7 @@ struct FollowConfig {
   double accel_max_mps2 = 0.5;    // Speeding up and braking.
   double lateral_max_mps2 = 0.4;  // In curves.
   double robot_radius_m = 0.5;
-  double clearance_full_m = 0.6;  // Beyond the radius: from here on full speed, at none a crawl.
+  double clearance_full_m = 0.3;  // Beyond the radius: from here on full speed, at none a crawl.
   double crawl_mps = 0.15;        // Slowest speed that regulation alone asks for.
   double lookahead_min_m = 0.35;
   double lookahead_s = 0.6;            // Look-ahead grows with speed.
@@ -54,16 +54,18 @@ std::string_view name(FollowPhase phase);
 // Where the following of one path stands. Start each path with a fresh one.
 struct FollowState {
   FollowPhase phase = FollowPhase::turning;
-  double progress_m{};      // Along the path; never falls.
-  double cross_track_m{};   // Distance from the path, now.
-  double remaining_m{};     // Along the path, now.
-  bool in_tolerance{};      // arrived: within the position tolerance.
-  std::size_t leg_start{};  // Vertices between which the path has no sharp corner.
-  std::size_t leg_end{};
-  double speed_mps{};  // Commanded last.
+  bool arrived{};          // phase == arrived.
+  bool in_tolerance{};     // Arrived within the position tolerance, not only as near as it could.
+  double progress_m{};     // Along the path; never falls.
+  double remaining_m{};    // Along the path.
+  double cross_track_m{};  // Distance from the path.
+  double speed_mps{};      // Commanded last.
+
+  // For follow() only.
+  int leg{-1};  // First vertex of the present leg; legs meet in sharp corners.
   int corrections{};
   int ticks_stalled{};
-  double best_measure{};  // For the stall watch: what has to shrink in this phase.
+  double progress_mark{};  // Beaten by a margin, it shows that the robot still gets on.
 };
 
 inline bool done(const FollowState& state) {
@@ -71,9 +73,12 @@ inline bool done(const FollowState& state) {
          state.phase == FollowPhase::stalled;
 }
 
-// One control step: what to command now, for one period. |forward| <= speed_max, |turn| <=
-// turn_max; backwards (slowly, <= 0.5 m) only to correct the last centimetres.
+// One control step: what to command for one period. |forward| <= speed_max and |turn| <= turn_max;
+// backwards only at a crawl, to correct the last centimetres.
 hal::Twist follow(const FollowConfig& config, FollowState& state, const Path& path,
                   const hal::Pose2& pose);
+// The same along a route, to the goal's heading.
+hal::Twist follow(const FollowConfig& config, FollowState& state, const Route& route,
+                  const hal::Pose2& goal, const hal::Pose2& pose);
 
 }  // namespace nav
