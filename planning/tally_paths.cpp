@@ -1,0 +1,85 @@
+#include "planning/tally_paths.hpp"
+
+#include <algorithm>
+
+namespace planning {
+namespace {
+
+// The first i of [low, high) with holds(i), which stays true once it is; high if none.
+template <class Holds>
+int first_that(int low, int high, const Holds& holds) {
+  while (low < high) {
+    const int middle = low + (high - low) / 2;
+    if (holds(middle)) {
+      high = middle;
+    } else {
+      low = middle + 1;
+    }
+  }
+  return low;
+}
+
+RowLimits limits_of(const ViewRule& rule, std::int64_t b, std::int64_t c) {
+  const std::int64_t m = b * b + c * c;
+  const auto distance2 = [m](std::int64_t a) { return a * a + m; };
+  const int end =
+      first_that(0, 1 << 15, [&](int a) { return distance2(a) > rule.distance2_max(); });
+  RowLimits limits;
+  limits.in_range_last = end - 1;
+  limits.in_range_first =
+      first_that(0, end, [&](int a) { return distance2(a) >= rule.distance2_min(); });
+  limits.x_face_first = first_that(
+      1, end + 1, [&](std::int64_t a) { return rule.along_normal(a * a, distance2(a)); });
+  const auto last_along = [&](std::int64_t n) {
+    if (n == 0) return -1;
+    return first_that(0, end, [&](int a) { return !rule.along_normal(n * n, distance2(a)); }) - 1;
+  };
+  limits.y_face_last = last_along(b);
+  limits.z_face_last = last_along(c);
+  return limits;
+}
+
+}  // namespace
+
+LayerPaths::LayerPaths(const ViewRule& rule, int c, int b_max) : c_(c) {
+  begin_.push_back(0);
+  for (int b = 0; b <= b_max; ++b) {
+    const RowLimits limits = limits_of(rule, b, c);
+    if (limits.in_range_last < 0) break;
+    limits_.push_back(limits);
+    add_path(b);
+  }
+}
+
+void LayerPaths::add_path(int b) {
+  const std::size_t first = cells_.size();
+  PathTimes times;
+  int j = 0, k = 0;
+  for (bool more = true; more;) {
+    // The next face along y is crossed at (2j+1)/(2b), along z at (2k+1)/(2c).
+    const std::int64_t y = (2 * std::int64_t{j} + 1) * c_, z = (2 * std::int64_t{k} + 1) * b;
+    const bool step_y = j < b && (k == c_ || y <= z), step_z = k < c_ && (j == b || z <= y);
+    more = step_y || step_z;
+    times.out_num = step_y ? 2 * j + 1 : step_z ? 2 * k + 1 : 2;
+    times.out_den = step_y ? b : step_z ? c_ : 1;
+    PathCell cell;
+    cell.in = static_cast<std::uint32_t>((std::int64_t{times.in_num} << 15) / times.in_den);
+    cell.out = static_cast<std::uint32_t>(
+        ((std::int64_t{times.out_num} << 15) + times.out_den - 1) / times.out_den);
+    cell.j = static_cast<std::int16_t>(j);
+    cell.k = static_cast<std::int16_t>(k);
+    cells_.push_back(cell);
+    times_.push_back(times);
+    times.in_num = times.out_num;
+    times.in_den = times.out_den;
+    j += step_y;
+    k += step_z;
+  }
+  for (std::size_t i = cells_.size(); i-- > first;) {
+    const bool goes_on = i + 1 < cells_.size() && cells_[i + 1].k == cells_[i].k;
+    cells_[i].run = static_cast<std::uint16_t>(goes_on ? cells_[i + 1].run + 1 : 1);
+  }
+  begin_.push_back(cells_.size());
+}
+
+}  // namespace planning

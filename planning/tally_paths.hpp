@@ -1,0 +1,76 @@
+// What the rays from one voxel to a whole row of candidates have in common.
+//
+// All rays from a voxel u to the candidates of one row (y and z fixed, x any) share their path in
+// the (y, z) plane: the same cells, entered and left at the same times t of [0, 1]. A candidate a
+// voxels along x is at x = a t, so within a cell of times (in, out) a run of blocked voxels [r0,
+// r1] (from u, in the direction of a) shadows exactly the candidates with
+//     a out > r0 - 1/2  and  a in < r1 + 1/2,
+// an interval with rational ends. (Several voxels of a run are as one: a ray that leaves one
+// through an inner face enters the next.)
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "planning/next_best_view.hpp"
+
+namespace planning {
+
+// Which of the candidates of a row at (b, c) voxels (|b|, |c| suffice) are in range and see a face;
+// all in |a|.
+struct RowLimits {
+  int in_range_first{}, in_range_last{-1};  // Empty if first > last.
+  int x_face_first{};                       // A face towards the candidate along x, from here on.
+  int y_face_last{-1}, z_face_last{-1};     // A face towards the row along y or z, up to here.
+};
+
+// A cell of the path in the (y, z) plane.
+struct PathCell {
+  std::uint32_t in{}, out{};  // Times in 1/65536; `in` rounded down, `out` up.
+  std::int16_t j{}, k{};      // Steps along y and z since u.
+  std::uint16_t run{};        // Cells from here on, this included, that differ by steps in y only.
+};
+// Its times exactly: num / (2 den).
+struct PathTimes {
+  std::int32_t in_num{}, in_den{1}, out_num{}, out_den{1};
+
+  // The candidates that blocked voxels [r0, r1], 0 <= r1, shadow: |a| in [first, last].
+  int shadow_first(int r0) const {
+    return r0 <= 0 ? 0 : static_cast<int>((2 * std::int64_t{r0} - 1) * out_den / out_num) + 1;
+  }
+  int shadow_last(int r1) const {
+    return in_num == 0 ? INT32_MAX
+                       : static_cast<int>(((2 * std::int64_t{r1} + 1) * in_den - 1) / in_num);
+  }
+};
+
+// Paths and limits of all rows in one layer of candidates, |c| voxels above or below u.
+class LayerPaths {
+ public:
+  LayerPaths(const ViewRule& rule, int c, int b_max);
+
+  int c() const { return c_; }
+  int rows() const { return static_cast<int>(limits_.size()); }  // |b| < rows() may be in range.
+  const RowLimits& limits(int b) const { return limits_[static_cast<std::size_t>(b)]; }
+
+  struct Path {
+    const PathCell* cells;
+    const PathTimes* times;
+    int count;
+  };
+  Path path(int b) const {
+    const auto i = static_cast<std::size_t>(b);
+    return {&cells_[begin_[i]], &times_[begin_[i]], static_cast<int>(begin_[i + 1] - begin_[i])};
+  }
+
+ private:
+  void add_path(int b);
+
+  int c_;
+  std::vector<RowLimits> limits_;
+  std::vector<std::size_t> begin_;
+  std::vector<PathCell> cells_;
+  std::vector<PathTimes> times_;
+};
+
+}  // namespace planning

@@ -1,0 +1,247 @@
+#include "planning/tally_sweep.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cstdlib>
+
+namespace planning {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "windows are loaded as bytes");
+
+std::uint64_t ones(int count) {
+  return count >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << count) - 1;
+}
+
+// Bits i with first <= base + i <= last.
+std::uint64_t span(int base, int first, int last) {
+  const int low = std::max(first - base, 0), high = std::min(last - base, 63);
+  return low > high ? 0 : ones(high - low + 1) << low;
+}
+
+std::uint64_t reverse_bits(std::uint64_t bits) {
+  const auto swap = [&](unsigned shift, std::uint64_t mask) {
+    bits = ((bits >> shift) & mask) | ((bits & mask) << shift);
+  };
+  swap(1, 0x5555555555555555);
+  swap(2, 0x3333333333333333);
+  swap(4, 0x0F0F0F0F0F0F0F0F);
+  return __builtin_bswap64(bits);
+}
+
+}  // namespace
+
+BlockedRows::BlockedRows(const VoxelMap& map) {
+  const VoxelGrid& grid = map.grid();
+  const auto row_words = static_cast<std::size_t>(map.row_words());
+  row_bytes_ = static_cast<std::int64_t>(row_words * sizeof(std::uint64_t));
+  const std::size_t words =
+      row_words * static_cast<std::size_t>(grid.ny) * static_cast<std::size_t>(grid.nz);
+  for (auto& level : words_) level.reserve(words + 1);
+  for (int z = 0; z < grid.nz; ++z)
+    for (int y = 0; y < grid.ny; ++y)
+      for (const std::uint64_t empty : map.empty_row(y, z)) words_[0].push_back(~empty);
+  for (int level = 1; level < kLevels; ++level) {
+    const int distance = 1 << (level - 1);
+    words_[level] = words_[level - 1];
+    for (int z = 0; z < grid.nz; ++z)
+      for (int y = 0; y + distance < grid.ny; ++y) {
+        const std::size_t row = (static_cast<std::size_t>(z) * static_cast<std::size_t>(grid.ny) +
+                                 static_cast<std::size_t>(y)) *
+                                row_words;
+        const std::size_t other = row + static_cast<std::size_t>(distance) * row_words;
+        for (std::size_t i = 0; i < row_words; ++i)
+          words_[level][row + i] |= words_[level - 1][other + i];
+      }
+  }
+  for (int level = 0; level < kLevels; ++level) {
+    words_[level].push_back(0);  // A window may be loaded past the last word.
+    bytes_[level] = reinterpret_cast<const unsigned char*>(words_[level].data());
+  }
+}
+
+CandidateLayer::CandidateLayer(int z, int row_words, const std::vector<Voxel>& candidates,
+                               std::size_t tally_begin)
+    : z_(z), tally_end_(tally_begin) {
+  words_.push_back(0);
+  for (const Voxel p : candidates) {
+    if (rows_.empty() || rows_.back().y != p.y) {
+      rows_.push_back({p.y, p.x, p.x, tally_end_, words_.size()});
+      words_.resize(words_.size() + static_cast<std::size_t>(row_words) + 1);
+    }
+    Row& row = rows_.back();
+    row.x_last = p.x;
+    tally_end_ = row.tally_begin + static_cast<std::size_t>(p.x - row.x_first) + 1;
+    words_[row.bits_begin + static_cast<std::size_t>(p.x >> 6)] |= std::uint64_t{1} << (p.x & 63);
+  }
+}
+
+std::size_t CandidateLayer::tally_of(Voxel candidate) const {
+  const auto row = std::lower_bound(rows_.begin(), rows_.end(), candidate.y,
+                                    [](const Row& r, int y) { return r.y < y; });
+  return row->tally_begin + static_cast<std::size_t>(candidate.x - row->x_first);
+}
+
+void Sweep::Live::measure() {
+  low = first + std::countr_zero(bits);
+  high = first + 63 - std::countl_zero(bits);
+}
+
+void Sweep::Live::clear(int from, int to) {
+  bits &= ~span(first, from, to);
+}
+
+void Sweep::add(const BoundaryVoxel& u, const CandidateLayer& layer) {
+  const int c = layer.z() - u.v.z;
+  if (paths_.empty() || paths_.front().c() != std::abs(c)) {
+    paths_.clear();
+    paths_.emplace_back(rule_, std::abs(c), grid_.ny - 1);
+  }
+  const LayerPaths& paths = paths_.front();
+  const bool z_face = c != 0 && (u.faces & (c > 0 ? kFaceZPlus : kFaceZMinus)) != 0;
+  if (!z_face && (u.faces & ~(kFaceZPlus | kFaceZMinus)) == 0) return;
+
+  Rays rays{};
+  rays.u = u.v;
+  rays.row_u = std::int64_t{u.v.z} * grid_.ny + u.v.y;
+  rays.step_z = c < 0 ? -grid_.ny : grid_.ny;
+  const auto first =
+      std::lower_bound(layer.rows().begin(), layer.rows().end(), u.v.y - paths.rows() + 1,
+                       [](const CandidateLayer::Row& r, int y) { return r.y < y; });
+  for (auto row = first; row != layer.rows().end() && row->y - u.v.y < paths.rows(); ++row) {
+    const int b = row->y - u.v.y;
+    const RowLimits& limits = paths.limits(std::abs(b));
+    int faced_last = z_face ? limits.z_face_last : -1;
+    if (b != 0 && (u.faces & (b > 0 ? kFaceYPlus : kFaceYMinus)) != 0)
+      faced_last = std::max(faced_last, limits.y_face_last);
+    const auto admit = [&](Face x_face) {
+      const bool faced = (u.faces & x_face) != 0;
+      const int from = std::max(limits.in_range_first, limits.x_face_first);
+      return Admitted{
+          {limits.in_range_first, from},
+          {std::min(faced_last, limits.in_range_last), faced ? limits.in_range_last : -1}};
+    };
+    rays.y_sign = b < 0 ? -1 : 1;
+    rays.step_y = rays.y_sign;
+    rays.path = paths.path(std::abs(b));
+    add_side<1>(rays, layer, *row, admit(kFaceXPlus));
+    add_side<-1>(rays, layer, *row, admit(kFaceXMinus));
+  }
+}
+
+template <int kSide>
+void Sweep::add_side(const Rays& rays, const CandidateLayer& layer, const CandidateLayer::Row& row,
+                     const Admitted& admitted) {
+  // In |a|, from the first to the last admitted candidate of the row; a = 0 is on the plus side.
+  int first = INT32_MAX, last = -1;
+  for (int i = 0; i < 2; ++i)
+    if (admitted.first[i] <= admitted.last[i]) {
+      first = std::min(first, admitted.first[i]);
+      last = std::max(last, admitted.last[i]);
+    }
+  const int nearest = kSide > 0 ? row.x_first - rays.u.x : rays.u.x - row.x_last;
+  const int farthest = kSide > 0 ? row.x_last - rays.u.x : rays.u.x - row.x_first;
+  first = std::max({first, nearest, kSide > 0 ? 0 : 1});
+  last = std::min(last, farthest);
+
+  const auto candidates = [&](int a) {
+    std::uint64_t bits;
+    if constexpr (kSide > 0) {
+      bits = layer.bits(row, rays.u.x + a);
+    } else {
+      bits = reverse_bits(layer.bits(row, rays.u.x - a - 63));
+    }
+    return bits &
+           (span(a, admitted.first[0], admitted.last[0]) |
+            span(a, admitted.first[1], admitted.last[1])) &
+           span(a, first, last);
+  };
+  while (first <= last) {
+    std::uint64_t bits = candidates(first);
+    if (bits != 0) {
+      const int skip = std::countr_zero(bits);
+      if (skip != 0) bits = candidates(first += skip);
+      Live live{bits, first, 0, 0};
+      cast<kSide>(rays, live);
+      const std::size_t zero =
+          row.tally_begin + static_cast<std::size_t>(rays.u.x + kSide * first - row.x_first);
+      for (; live.bits != 0; live.bits &= live.bits - 1) {
+        const auto i = static_cast<std::size_t>(std::countr_zero(live.bits));
+        ++tallies_[kSide > 0 ? zero + i : zero - i];
+      }
+    }
+    first += 64;
+  }
+}
+
+// Clears the candidates that something hides, from u outwards.
+template <int kSide>
+void Sweep::cast(const Rays& rays, Live& live) const {
+  live.measure();
+  shade<kSide>(rays, 0, live);
+  int level = 1;
+  for (int i = 1; i < rays.path.count && live.bits != 0;) {
+    const PathCell& cell = rays.path.cells[i];
+    while ((1 << level) > cell.run) --level;
+    const int cells = 1 << level;
+    // Cells that differ in y only are one row of a higher level: its lowest y.
+    const int j = rays.y_sign > 0 ? cell.j : cell.j + cells - 1;
+    const std::int64_t row = rays.row_u + j * rays.step_y + cell.k * rays.step_z;
+    const int first =
+        static_cast<int>((static_cast<std::uint32_t>(live.low) * cell.in + 0x8000U) >> 16);
+    const int last = static_cast<int>(
+        (static_cast<std::uint32_t>(live.high) * rays.path.cells[i + cells - 1].out + 0x8000U) >>
+        16);
+    if (clear_window<kSide>(rays, level, row, first, last)) {
+      i += cells;
+      level = std::min(level + 1, BlockedRows::kLevels - 1);
+    } else if (level > 0) {
+      level = level / 2;
+    } else {
+      shade<kSide>(rays, i, live);
+      ++i;
+    }
+  }
+}
+
+// Bits of voxels first .. first + width - 1 from u, in the direction of a for the plus side and
+// reversed for the minus side.
+template <int kSide>
+std::uint64_t Sweep::window(const Rays& rays, int level, std::int64_t row, int first,
+                            int width) const {
+  const int x = kSide > 0 ? rays.u.x + first : rays.u.x - first - width + 1;
+  return blocked_.window(level, row, x, width);
+}
+
+template <int kSide>
+bool Sweep::clear_window(const Rays& rays, int level, std::int64_t row, int first, int last) const {
+  for (; last - first >= BlockedRows::kWindow; first += BlockedRows::kWindow)
+    if (window<kSide>(rays, level, row, first, BlockedRows::kWindow) != 0) return false;
+  return window<kSide>(rays, level, row, first, last - first + 1) == 0;
+}
+
+// Clears what the blocked voxels of one cell shadow. u itself does not block.
+template <int kSide>
+void Sweep::shade(const Rays& rays, int cell, Live& live) const {
+  const PathCell& c = rays.path.cells[cell];
+  const PathTimes& times = rays.path.times[cell];
+  const std::int64_t row = rays.row_u + c.j * rays.step_y + c.k * rays.step_z;
+  int first = static_cast<int>((static_cast<std::uint32_t>(live.low) * c.in + 0x8000U) >> 16);
+  const int last =
+      static_cast<int>((static_cast<std::uint32_t>(live.high) * c.out + 0x8000U) >> 16);
+  if (cell == 0) first = 1;
+  for (; first <= last && live.bits != 0; first += BlockedRows::kWindow) {
+    const int width = std::min(last - first + 1, BlockedRows::kWindow);
+    std::uint64_t blocked = window<kSide>(rays, 0, row, first, width);
+    while (blocked != 0) {
+      const int begin = std::countr_zero(blocked);
+      const int length = std::countr_one(blocked >> begin);
+      blocked &= ~(ones(length) << begin);
+      const int r0 = kSide > 0 ? first + begin : first + width - begin - length;
+      live.clear(times.shadow_first(r0), times.shadow_last(r0 + length - 1));
+    }
+  }
+  if (live.bits != 0) live.measure();
+}
+
+}  // namespace planning

@@ -1,0 +1,119 @@
+// The row-interval sweep: Counts(p) for all candidates at once, exactly. See tally_paths.hpp.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+#include "planning/next_best_view.hpp"
+#include "planning/tally_paths.hpp"
+
+namespace planning {
+
+// What blocks the view (not seen-empty), one bit per voxel, and the same with 2, 4, 8 and 16 rows
+// or-ed together: row y of level l is blocked where any of rows y .. y + 2^l - 1 is.
+class BlockedRows {
+ public:
+  static constexpr int kLevels = 5;
+  static constexpr int kWindow = 57;  // The widest window() that one load can give.
+
+  explicit BlockedRows(const VoxelMap& map);
+
+  // Bits x .. x + width - 1 of row `row` (z ny + y), 1 <= width <= kWindow, 0 <= x.
+  std::uint64_t window(int level, std::int64_t row, int x, int width) const {
+    std::uint64_t bits;
+    std::memcpy(&bits, bytes_[level] + row * row_bytes_ + (x >> 3), sizeof bits);
+    return (bits >> (x & 7)) & ((std::uint64_t{1} << width) - 1);
+  }
+
+ private:
+  std::int64_t row_bytes_;
+  std::vector<std::uint64_t> words_[kLevels];
+  const unsigned char* bytes_[kLevels];
+};
+
+// The seen-empty candidates of one layer as rows of bits, and where their tallies are kept.
+class CandidateLayer {
+ public:
+  struct Row {
+    int y{};
+    int x_first{}, x_last{-1};
+    std::size_t tally_begin{};  // Of x_first.
+    std::size_t bits_begin{};   // Of the word of x = 0; a word of 0 lies before and behind.
+  };
+
+  // candidates: of this z, ordered by y, then x, without repetition. tally_begin: of the layer.
+  CandidateLayer(int z, int row_words, const std::vector<Voxel>& candidates,
+                 std::size_t tally_begin);
+
+  int z() const { return z_; }
+  const std::vector<Row>& rows() const { return rows_; }
+  std::size_t tally_end() const { return tally_end_; }
+  std::size_t tally_of(Voxel candidate) const;
+
+  // 64 candidates from x on, -64 <= x.
+  std::uint64_t bits(const Row& row, int x) const {
+    const std::size_t bit = 64 * (row.bits_begin - 1) + static_cast<std::size_t>(x + 64);
+    const unsigned shift = bit & 63;
+    const std::uint64_t low = words_[bit >> 6] >> shift;
+    return shift == 0 ? low : low | (words_[(bit >> 6) + 1] << (64 - shift));
+  }
+
+ private:
+  int z_;
+  std::vector<Row> rows_;
+  std::vector<std::uint64_t> words_;
+  std::size_t tally_end_;
+};
+
+// One thread's sweep. Adds to its own tallies.
+class Sweep {
+ public:
+  Sweep(const VoxelGrid& grid, const BlockedRows& blocked, const ViewRule& rule,
+        std::size_t tallies)
+      : grid_(grid), blocked_(blocked), rule_(rule), tallies_(tallies) {}
+
+  void add(const BoundaryVoxel& u, const CandidateLayer& layer);
+  const std::vector<std::uint32_t>& tallies() const { return tallies_; }
+
+ private:
+  // The candidates a = side |a| whose |a| is in one of two spans (inclusive).
+  struct Admitted {
+    int first[2], last[2];
+  };
+  // Where rays go: from u along a row.
+  struct Rays {
+    Voxel u;
+    std::int64_t row_u, step_y, step_z;  // Rows of BlockedRows.
+    int y_sign;
+    LayerPaths::Path path;
+  };
+  // Candidates still visible: bit i for |a| = first + i.
+  struct Live {
+    std::uint64_t bits;
+    int first;
+    int low, high;  // The smallest and the largest |a|; meaningless when bits is 0.
+    void measure();
+    void clear(int from, int to);
+  };
+
+  template <int kSide>
+  void add_side(const Rays& rays, const CandidateLayer& layer, const CandidateLayer::Row& row,
+                const Admitted& admitted);
+  template <int kSide>
+  void cast(const Rays& rays, Live& live) const;
+  template <int kSide>
+  void shade(const Rays& rays, int cell, Live& live) const;
+  template <int kSide>
+  std::uint64_t window(const Rays& rays, int level, std::int64_t row, int first, int width) const;
+  template <int kSide>
+  bool clear_window(const Rays& rays, int level, std::int64_t row, int first, int last) const;
+
+  const VoxelGrid& grid_;
+  const BlockedRows& blocked_;
+  ViewRule rule_;
+  std::vector<LayerPaths> paths_;  // At most one: of the |c| last asked for.
+  std::vector<std::uint32_t> tallies_;
+};
+
+}  // namespace planning
