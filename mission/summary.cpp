@@ -1,0 +1,201 @@
+#include "mission/summary.hpp"
+
+#include <algorithm>
+#include <boost/json/value_from.hpp>
+#include <cmath>
+#include <numbers>
+
+#include "mission/json_text.hpp"
+#include "mission/report_facts.hpp"
+
+namespace mission {
+namespace {
+
+namespace json = boost::json;
+
+double mm(double length_m) {
+  return rounded(length_m, 3);
+}
+double degrees(double angle_rad) {
+  return rounded(angle_rad * 180 / std::numbers::pi, 4);
+}
+
+json::value share(std::optional<double> value) {
+  return value ? json::value(rounded(*value, 5)) : json::value(nullptr);
+}
+
+json::object pose_json(const hal::Pose2& pose) {
+  return {{"x_m", mm(pose.position_m.x())},
+          {"y_m", mm(pose.position_m.y())},
+          {"heading_deg", degrees(pose.heading_rad)}};
+}
+
+json::object voxels_json(const VoxelCounts& counts) {
+  return {{"seen_occupied", counts.seen_occupied},
+          {"seen_empty", counts.seen_empty},
+          {"unseen", counts.unseen},
+          {"boundary_unseen", counts.boundary_unseen}};
+}
+
+void add_coverage(json::object& to, const Coverage& coverage) {
+  to["target_m"] = mm(coverage.target_m);
+  to["coverable_m"] = mm(coverage.coverable_m);
+  to["planned_m"] = mm(coverage.planned_m);
+  to["covered_m"] = mm(coverage.covered_m);
+  to["covered_of_coverable"] = share(coverage.of_coverable());
+  to["covered_of_target"] = share(coverage.of_target());
+}
+
+json::array uncovered_json(const AreaPlan& plan, const AreaFacts& facts) {
+  json::array pieces;
+  for (const GapStretch& stretch : gap_stretches(plan, facts.gaps)) {
+    if (stretch.length_m <= 0.5) break;  // Longest first.
+    pieces.push_back({{"from_m", {mm(stretch.from_m.x()), mm(stretch.from_m.y())}},
+                      {"to_m", {mm(stretch.to_m.x()), mm(stretch.to_m.y())}},
+                      {"length_m", mm(stretch.length_m)},
+                      {"reason", why_text(stretch.why).word}});
+  }
+  return pieces;
+}
+
+json::object area_json(const AreaPlan& plan, const AreaFacts& facts) {
+  const auto scanned = std::count_if(facts.scan_of_station.begin(), facts.scan_of_station.end(),
+                                     [](int scan) { return scan >= 0; });
+  json::object area{{"name", plan.area.name},      {"region", plan.area.region},
+                    {"mode", plan.mode},           {"stations", plan.cover.stations.size()},
+                    {"stations_scanned", scanned}, {"tour_m", mm(plan.tour_m)}};
+  add_coverage(area, coverage_of(plan, facts));
+  area["end"] = plan.cover.end;
+  area["uncovered_over_0.5_m"] = uncovered_json(plan, facts);
+  return area;
+}
+
+json::object coverage_json(const RunRecord& record) {
+  Coverage all;
+  json::array areas;
+  for (const AreaPlan& plan : record.plans) {
+    const AreaFacts facts = area_facts(record, plan);
+    all += coverage_of(plan, facts);
+    areas.push_back(area_json(plan, facts));
+  }
+  json::object coverage;
+  add_coverage(coverage, all);
+  coverage["areas"] = std::move(areas);
+  return coverage;
+}
+
+json::object scan_json(const RunRecord& record, std::size_t index) {
+  const ScanRecord& scan = record.scans[index];
+  json::object object{{"number", scan.number},
+                      {"name", scan.name},
+                      {"area", scan.area},
+                      {"kind", scan.next_best_view ? "next_best_view" : "station"},
+                      {"by_hand", scan.by_hand},
+                      {"planned", pose_json(scan.planned)},
+                      {"believed", pose_json(scan.believed)},
+                      {"sigma_position_m", rounded(scan.sigma_position_m, 4)},
+                      {"sigma_heading_deg", degrees(scan.sigma_heading_rad)},
+                      {"truth", nullptr},
+                      {"ground_z_m", mm(scan.ground_z_m)},
+                      {"start_s", mm(scan.start_s)},
+                      {"end_s", mm(scan.end_s)},
+                      {"driven_m", mm(scan.driven_m)},
+                      {"beams", scan.beams},
+                      {"points", scan.points},
+                      {"points_outside_box", scan.points_outside_box}};
+  if (scan.truth) object["truth"] = pose_json(*scan.truth);
+  if (scan.next_best_view) {
+    object["predicted_voxels"] = scan.predicted_voxels;
+    object["resolved_voxels"] = scan.resolved_voxels;
+  } else {
+    object["adds_m"] = mm(scan.adds_m);
+    object["overlaps_m"] = mm(scan.overlaps_m);
+  }
+  object["occupied_gained"] = occupied_gained(record, index);
+  object["after"] = voxels_json(scan.after);
+  object["visible_to_next"] = scan.visible_to_next;
+  return object;
+}
+
+json::array dropped_json(const RunRecord& record) {
+  json::array dropped;
+  for (const DroppedStation& station : record.dropped) {
+    dropped.push_back({{"name", station.name},
+                       {"area", station.area},
+                       {"planned", pose_json(station.planned)},
+                       {"reason", station.reason}});
+  }
+  return dropped;
+}
+
+json::value truth_json(const std::optional<Truth>& truth) {
+  if (!truth) return nullptr;
+  const auto visible = static_cast<double>(truth->surface_visible);
+  const auto seen = static_cast<double>(truth->surface_seen);
+  return {{"surface_visible", truth->surface_visible},
+          {"surface_seen", truth->surface_seen},
+          {"seen_of_visible", share(visible > 0 ? std::optional(seen / visible) : std::nullopt)},
+          {"position_error_max_m", rounded(truth->position_error_max_m, 4)},
+          {"position_error_rms_m", rounded(truth->position_error_rms_m, 4)},
+          {"heading_error_max_deg", degrees(truth->heading_error_max_rad)},
+          {"nees_mean", rounded(truth->nees_mean, 4)}};
+}
+
+json::object files_json(const ProductFacts& products) {
+  json::object files{{"cloud_points", products.cloud_points},
+                     {"cloud_grid_m", products.cloud_grid_m},
+                     {"cloud_grid_doublings", products.cloud_doublings},
+                     {"map_ot_offset_m", nullptr}};
+  if (const auto& offset_m = products.map_ot_offset_m) {
+    files["map_ot_offset_m"] = {offset_m->x(), offset_m->y(), offset_m->z()};
+  }
+  return files;
+}
+
+json::object counts_json(const RunRecord& record) {
+  std::size_t planned = 0;
+  for (const AreaPlan& plan : record.plans) planned += plan.cover.stations.size();
+  const auto views = std::count_if(record.scans.begin(), record.scans.end(),
+                                   [](const ScanRecord& scan) { return scan.next_best_view; });
+  const auto by_hand = std::count_if(record.scans.begin(), record.scans.end(),
+                                     [](const ScanRecord& scan) { return scan.by_hand; });
+  return {{"stations_planned", planned},
+          {"stations_scanned", static_cast<std::int64_t>(record.scans.size()) - views},
+          {"next_best_views", views},
+          {"dropped", record.dropped.size()},
+          {"by_hand", by_hand}};
+}
+
+}  // namespace
+
+json::object summarise(const RunRecord& record, const ProductFacts& products) {
+  json::object summary{{"mission", record.mission},
+                       {"site", record.site},
+                       {"robot", record.robot},
+                       {"seed", record.seed},
+                       {"completed", record.completed},
+                       {"end", record.end},
+                       {"mission_s", mm(record.mission_s)},
+                       {"driven_m", mm(record.driven_total_m)},
+                       {"voxel_m", record.voxel_m},
+                       {"gain_min_voxels", record.gain_min_voxels}};
+  summary["counts"] = counts_json(record);
+  summary["coverage"] = coverage_json(record);
+  summary["voxels"] =
+      record.scans.empty() ? json::value(nullptr) : voxels_json(record.scans.back().after);
+  json::array scans;
+  for (std::size_t i = 0; i < record.scans.size(); ++i) scans.push_back(scan_json(record, i));
+  summary["scans"] = std::move(scans);
+  summary["dropped"] = dropped_json(record);
+  json::array repairs;
+  for (const auto& repair : record.repairs) {
+    repairs.push_back({{"where", repair.where}, {"what", repair.what}});
+  }
+  summary["repairs"] = std::move(repairs);
+  summary["notes"] = json::value_from(record.notes);
+  summary["truth"] = truth_json(record.truth);
+  summary["files"] = files_json(products);
+  return summary;
+}
+
+}  // namespace mission
