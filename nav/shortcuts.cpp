@@ -73,18 +73,8 @@ class Pass {
   std::vector<double> pieces_m_;
 };
 
-}  // namespace
-
-double polyline_length_m(const Points& points_m) {
-  double length_m = 0;
-  for (std::size_t i = 1; i < points_m.size(); ++i)
-    length_m += (points_m[i] - points_m[i - 1]).norm();
-  return length_m;
-}
-
-Points take_shortcuts(Points points_m, double comfort_m, const ClearanceOf& clearance_of) {
+Points shortened(Points points_m, double comfort_m, const ClearanceOf& clearance_of) {
   double length_m = polyline_length_m(points_m);
-  if (points_m.size() < 3) return points_m;
   for (int pass = 0; pass < kPassesMax; ++pass) {
     const Points dense = resample(points_m, std::max(kStepMinM, length_m / kPointsMax));
     Points shorter = Pass(dense, comfort_m, clearance_of).run();
@@ -100,6 +90,25 @@ Points take_shortcuts(Points points_m, double comfort_m, const ClearanceOf& clea
     if (settled) break;
   }
   return points_m;
+}
+
+}  // namespace
+
+double polyline_length_m(const Points& points_m) {
+  double length_m = 0;
+  for (std::size_t i = 1; i < points_m.size(); ++i)
+    length_m += (points_m[i] - points_m[i - 1]).norm();
+  return length_m;
+}
+
+// Both ways round, so that the way back is as long as the way there.
+Points take_shortcuts(const Points& points_m, double comfort_m, const ClearanceOf& clearance_of) {
+  if (points_m.size() < 3) return points_m;
+  Points forth = shortened(points_m, comfort_m, clearance_of);
+  Points back = shortened({points_m.rbegin(), points_m.rend()}, comfort_m, clearance_of);
+  if (polyline_length_m(forth) <= polyline_length_m(back)) return forth;
+  std::reverse(back.begin(), back.end());
+  return back;
 }
 
 }  // namespace nav

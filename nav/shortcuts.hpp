@@ -15,7 +15,7 @@ using ClearanceOf = std::function<double(const Segment2& piece_m, double cap_m)>
 
 // Replaces parts of the polyline by straight lines. Such a line keeps comfort_m, or the clearance
 // of the part it replaces if that is less. End points stay; the result is never longer.
-std::vector<Eigen::Vector2d> take_shortcuts(std::vector<Eigen::Vector2d> points_m, double comfort_m,
-                                            const ClearanceOf& clearance_of);
+std::vector<Eigen::Vector2d> take_shortcuts(const std::vector<Eigen::Vector2d>& points_m,
+                                            double comfort_m, const ClearanceOf& clearance_of);
 
 }  // namespace nav
