@@ -28,6 +28,11 @@ inline float fast_atan2(float y, float x) {
   return y < 0 ? -angle : angle;
 }
 
+// At least the arc sine, and not much more.
+double arc_sine_above(double sine) {
+  return sine < 0.25 ? 1.011 * sine : std::asin(sine);
+}
+
 // A step to divide by, also where there is only one column or row.
 double usable_step(double step_rad, std::uint32_t count) {
   return count > 1 ? step_rad : 1.0;
@@ -133,7 +138,7 @@ std::uint64_t BeamCarver::crossed(int word, int y, int z, std::uint64_t wanted) 
     const float distance = sight.distance[i];
     if (distance > static_cast<float>(reach_max_ + kHalfDiagonal + kSlack)) continue;
     if (surely_crossed(distance, sight.azimuth_rad[i], sight.elevation_rad[i]) ||
-        search({64 * word + i, y, z}))
+        search({64 * word + i, y, z}, sight.azimuth_rad[i], sight.elevation_rad[i]))
       result |= std::uint64_t{1} << i;
   }
   return result;
@@ -183,33 +188,23 @@ bool BeamCarver::surely_crossed(float distance, float azimuth_rad, float elevati
   return tile.min_m >= (distance + static_cast<float>(kSlack)) * static_cast<float>(grid_.voxel_m);
 }
 
-BeamCarver::Sight BeamCarver::sight_of(Voxel v) const {
+bool BeamCarver::search(Voxel v, double azimuth_rad, double elevation_rad) const {
   const Eigen::Vector3d c = S_corner_ + R_S_W_ * Eigen::Vector3d(v.x, v.y, v.z);
-  return {c.x(),
-          c.y(),
-          c.z(),
-          c.norm(),
-          std::atan2(c.y(), c.x()),
-          std::atan2(c.z(), std::hypot(c.x(), c.y()))};
-}
-
-bool BeamCarver::search(Voxel v) const {
-  const Sight sight = sight_of(v);
-  if (search(v, sight, sight.azimuth_rad, sight.elevation_rad)) return true;
+  const Sight sight{c.x(), c.y(), c.z(), c.norm()};
+  if (search_around(v, sight, azimuth_rad, elevation_rad)) return true;
   // An elevation beyond the pole is the opposite azimuth.
-  return over_the_pole_ && search(v, sight, sight.azimuth_rad + kPi, kPi - sight.elevation_rad);
+  return over_the_pole_ && search_around(v, sight, azimuth_rad + kPi, kPi - elevation_rad);
 }
 
 // All beams within the angle that the voxel's circumscribed sphere fills.
-bool BeamCarver::search(Voxel v, const Sight& sight, double azimuth_rad,
-                        double elevation_rad) const {
+bool BeamCarver::search_around(Voxel v, const Sight& sight, double azimuth_rad,
+                               double elevation_rad) const {
   double angle = 2 * kPi, azimuth_angle = 2 * kPi;
   const double sine = (kHalfDiagonal + kSlack) / sight.distance;
   if (sine < 1) {
-    angle = std::asin(sine) + kAngleSlack;
-    const double flat = std::cos(sight.elevation_rad);
-    if (std::sin(angle) < flat * 0.999 && angle < kPi / 2)
-      azimuth_angle = std::asin(std::sin(angle) / flat) + kAngleSlack;
+    angle = arc_sine_above(sine) + kAngleSlack;
+    const double flat = std::sqrt(sight.x * sight.x + sight.y * sight.y) / sight.distance;
+    if (angle < 0.999 * flat) azimuth_angle = arc_sine_above(angle / flat) + kAngleSlack;
   }
   return for_indices(elevation_rad - angle, elevation_rad + angle, pattern_.elevation_first_rad,
                      row_step_rad_, pattern_.rows, [&](int row_first, int row_last) {

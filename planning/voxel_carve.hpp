@@ -50,7 +50,6 @@ class BeamCarver {
   struct Sight {
     double x, y, z;  // In S.
     double distance;
-    double azimuth_rad, elevation_rad;
   };
   // The same for the 64 voxels of a word, in single precision.
   struct WordSight {
@@ -65,12 +64,11 @@ class BeamCarver {
 
   void look(int word, int y, int z, WordSight& sight) const;
   bool surely_crossed(float distance, float azimuth_rad, float elevation_rad) const;
-  bool search(Voxel v) const;
-  bool search(Voxel v, const Sight& sight, double azimuth_rad, double elevation_rad) const;
+  bool search(Voxel v, double azimuth_rad, double elevation_rad) const;
+  bool search_around(Voxel v, const Sight& sight, double azimuth_rad, double elevation_rad) const;
   bool search_window(Voxel v, const Sight& sight, Span columns, Span rows) const;
   bool search_tile(Voxel v, const Sight& sight, Span columns, Span rows) const;
   bool may_meet(const Sight& sight, int tile_column, int tile_row) const;
-  Sight sight_of(Voxel v) const;
 
   const VoxelGrid& grid_;
   const hal::ScanPattern& pattern_;
