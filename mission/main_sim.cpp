@@ -1,0 +1,208 @@
+#include "mission/main_sim.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "nav/polygons.hpp"
+#include "nav/raster.hpp"
+#include "sim/ground.hpp"
+#include "sim/surface_truth.hpp"
+
+namespace mission {
+namespace {
+
+constexpr double radians(double degrees) {
+  return degrees * std::numbers::pi / 180;
+}
+
+// A ground sample every so far is enough to tell whether a model has a ground.
+constexpr double kGroundSampleM = 4.0;
+
+sim::ScannerModel scanner_model(const RobotConfig& robot) {
+  const ScannerConfig& scanner = robot.scanner;
+  return {.height_m = scanner.height_m,
+          .range_min_m = scanner.range_min_m,
+          .range_max_m = scanner.range_max_m,
+          .fov_rad = radians(scanner.fov_deg),
+          .azimuth_step_rad = radians(scanner.azimuth_step_deg),
+          .elevation_min_rad = radians(scanner.elevation_min_deg),
+          .elevation_max_rad = radians(scanner.elevation_max_deg),
+          .elevation_step_rad = radians(scanner.elevation_step_deg),
+          .scan_s = scanner.scan_s,
+          .range_sigma_m = robot.sim.range_sigma_m,
+          .grazing_start_rad = radians(scanner.grazing_max_deg)};
+}
+
+sim::WorldConfig world_config(const MissionConfig& config, const SiteTasks& tasks, int threads) {
+  const RobotConfig& robot = config.robot;
+  sim::WorldConfig world;
+  world.seed = config.seed;
+  world.threads = threads;
+  world.radius_m = robot.body.radius_m;
+  world.track_m = robot.body.track_m;
+  world.speed_max_mps = robot.body.speed_max_mps;
+  world.turn_max_radps = radians(robot.body.turn_max_degps);
+  world.slip_sigma = robot.sim.slip_sigma;
+  world.gyro_sigma_radps = radians(robot.sim.gyro_sigma_degps);
+  world.gyro_bias_sigma_radps = radians(robot.sim.gyro_bias_degps);
+  world.gnss_sigma_m = robot.sim.gnss_sigma_m;
+  world.placement_sigma_m = robot.sim.placement_sigma_m;
+  world.placement_heading_sigma_rad = radians(robot.sim.placement_heading_sigma_deg);
+  world.placement_s = robot.sim.placement_s;
+  world.scanner = scanner_model(robot);
+  for (const AreaTask& task : tasks.tasks)
+    world.region_ground_z_m[task.area.name] = task.area.ground_z_m;
+  return world;
+}
+
+double start_ground_z_m(const SiteTasks& tasks) {
+  if (tasks.start_area < 0) return 0;
+  return tasks.tasks[static_cast<std::size_t>(tasks.start_area)].area.ground_z_m;
+}
+
+// Centres of a grid of cells on the standable ground.
+std::vector<Eigen::Vector3d> ground_samples(const std::vector<AreaTask>& tasks) {
+  std::vector<Eigen::Vector3d> samples;
+  for (const AreaTask& task : tasks) {
+    if (task.mode == AreaMode::skip) continue;
+    Eigen::AlignedBox2d box;
+    for (const nav::SegmentMm& edge : nav::edges(task.area.standable))
+      box.extend(nav::to_m(edge.a));
+    const Eigen::Vector2d size = box.sizes() / kGroundSampleM;
+    const nav::RasterGrid grid{box.min(), kGroundSampleM, static_cast<int>(size.x()) + 1,
+                               static_cast<int>(size.y()) + 1};
+    const auto inside = nav::rasterize(task.area.standable, grid);
+    for (int y = 0; y < grid.ny; ++y)
+      for (int x = 0; x < grid.nx; ++x)
+        if (inside[grid.index(x, y)])
+          samples.emplace_back(grid.center_m(x, y).x(), grid.center_m(x, y).y(),
+                               task.area.ground_z_m);
+  }
+  return samples;
+}
+
+double wrapped(double angle_rad) {
+  return std::remainder(angle_rad, 2 * std::numbers::pi);
+}
+
+}  // namespace
+
+SimSite load_sim_site(const std::filesystem::path& model_file) {
+  sim::ParsedMesh parsed = sim::load_obj(model_file);
+  return {.mesh = std::move(parsed.mesh), .notes = {}, .errors = std::move(parsed.errors)};
+}
+
+void assume_ground(SimSite& site, nav::SiteMap& map) {
+  const auto ground_z_m = sim::estimate_ground_z_m(site.mesh);
+  if (!ground_z_m) {
+    site.notes.push_back(
+        "neither the map (ground_z_m) nor the model's walls tell the height of the ground: 0 m");
+    return;
+  }
+  map.ground_z_m = *ground_z_m;
+  for (nav::Region& region : map.regions) region.ground_z_m = *ground_z_m;
+  site.notes.push_back(
+      fmt::format("the map has no ground_z_m: ground assumed at {:.2f} m, where most of the "
+                  "model's walls stand",
+                  *ground_z_m));
+}
+
+void complete_ground(SimSite& site, const nav::SiteMap& map, const std::vector<AreaTask>& tasks) {
+  const std::vector<Eigen::Vector3d> samples = ground_samples(tasks);
+  if (samples.empty()) return;
+  Eigen::AlignedBox2d box;
+  for (const nav::SegmentMm& edge : nav::edges(map.boundary)) box.extend(nav::to_m(edge.a));
+  const sim::GroundReport report = sim::ensure_ground(site.mesh, samples, box);
+  if (report.added)
+    site.notes.push_back(
+        fmt::format("the model has ground under {} of {} sample points only: a level ground was "
+                    "added at {:.2f} m",
+                    report.with_ground, report.samples, report.added_z_m));
+}
+
+SimBackend::SimBackend(const MissionConfig& config, const SiteTasks& tasks, SimSite site,
+                       int threads)
+    : config_(config),
+      threads_(threads),
+      site_(std::move(site)),
+      scene_(site_.mesh),
+      world_(scene_, world_config(config, tasks, threads)),
+      robot_(world_, clock_),
+      devices_(robot_.devices()) {
+  if (tasks.start_area < 0) return;
+  if (!world_.put_robot(tasks.start, start_ground_z_m(tasks)))
+    throw std::runtime_error(fmt::format(
+        "the robot cannot stand at its start ({:.2f}, {:.2f}): the model has something there, or "
+        "no "
+        "ground near {:.2f} m; move the map's `start`",
+        tasks.start.position_m.x(), tasks.start.position_m.y(), start_ground_z_m(tasks)));
+}
+
+Truth SimBackend::judge(RunRecord& record, const SiteModel& model,
+                        const std::vector<AreaTask>& tasks) const {
+  Truth truth;
+  judge_poses(record, truth);
+  judge_surface(record, model, tasks, truth);
+  return truth;
+}
+
+void SimBackend::judge_poses(RunRecord& record, Truth& truth) const {
+  double squares_m2 = 0, nees = 0;
+  for (ScanRecord& scan : record.scans) {
+    const sim::ScanTruth& at = world_.scans().at(static_cast<std::size_t>(scan.number - 1));
+    scan.truth = at.at.pose;
+    Eigen::Vector3d error;
+    error << scan.believed.position_m - at.at.pose.position_m,
+        wrapped(scan.believed.heading_rad - at.at.pose.heading_rad);
+    const double distance_m = error.head<2>().norm();
+    truth.position_error_max_m = std::max(truth.position_error_max_m, distance_m);
+    truth.heading_error_max_rad = std::max(truth.heading_error_max_rad, std::abs(error.z()));
+    squares_m2 += distance_m * distance_m;
+    nees += error.dot(scan.covariance.ldlt().solve(error));
+  }
+  const double scans = static_cast<double>(std::max<std::size_t>(record.scans.size(), 1));
+  truth.position_error_rms_m = std::sqrt(squares_m2 / scans);
+  truth.nees_mean = nees / scans;
+}
+
+void SimBackend::judge_surface(const RunRecord& record, const SiteModel& model,
+                               const std::vector<AreaTask>& tasks, Truth& truth) const {
+  const ScannerConfig& scanner = config_.robot.scanner;
+  std::vector<Eigen::Vector3d> positions;
+  for (const ScanRecord& scan : record.scans)
+    positions.emplace_back(scan.truth->position_m.x(), scan.truth->position_m.y(),
+                           scan.ground_z_m + scanner.height_m);
+  const std::size_t stations = positions.size();
+  // Every cell on which the robot or a tripod could really stand, in the areas that were surveyed.
+  for (const ViewCell& cell : model.cells()) {
+    const Eigen::Vector3d position_m = model.cell_position_m(cell);
+    const double ground_z_m = tasks[static_cast<std::size_t>(cell.task)].area.ground_z_m;
+    if (world_.standing({position_m.head<2>(), 0}, ground_z_m, config_.robot.body.radius_m))
+      positions.push_back(position_m);
+  }
+  const planning::VoxelGrid& grid = model.map().grid();
+  const sim::SurfaceTruth surface = sim::judge_surface(
+      site_.mesh, scene_,
+      {.W_min_m = grid.W_min_m,
+       .voxel_m = grid.voxel_m,
+       .nx = grid.nx,
+       .ny = grid.ny,
+       .nz = grid.nz},
+      {.range_min_m = scanner.range_min_m,
+       .range_max_m = scanner.range_max_m,
+       .grazing_max_rad = radians(scanner.grazing_max_deg),
+       .elevation_min_rad = radians(scanner.elevation_min_deg),
+       .elevation_max_rad = radians(scanner.elevation_max_deg)},
+      positions, stations,
+      [&](int x, int y, int z) {
+        return model.map().at({x, y, z}) == planning::VoxelState::seen_occupied;
+      },
+      threads_);
+  truth.surface_visible = surface.visible;
+  truth.surface_seen = surface.visible_seen;
+}
+
+}  // namespace mission

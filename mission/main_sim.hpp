@@ -1,0 +1,69 @@
+// The simulation backend of vantaged: a world behind the devices, and its judgement afterwards.
+// Like main.cpp it may know everything.
+#pragma once
+
+#include <boost/asio/io_context.hpp>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "mission/config.hpp"
+#include "mission/plan.hpp"
+#include "mission/record.hpp"
+#include "mission/site_model.hpp"
+#include "sim/devices.hpp"
+#include "sim/mesh.hpp"
+#include "sim/scene.hpp"
+#include "sim/sim_clock.hpp"
+#include "sim/world.hpp"
+
+namespace mission {
+
+// The site's true surfaces, or why there are none.
+struct SimSite {
+  sim::Mesh mesh;
+  std::vector<std::string> notes;
+  std::vector<std::string> errors;
+};
+
+SimSite load_sim_site(const std::filesystem::path& model_file);
+
+// For maps that say nothing of the ground's height: what the model's walls stand on. Changes the
+// map and its regions, and says so in the notes.
+void assume_ground(SimSite& site, nav::SiteMap& map);
+
+// Adds a level ground where the model has none under the places where the robot or a person stands.
+void complete_ground(SimSite& site, const nav::SiteMap& map, const std::vector<AreaTask>& tasks);
+
+class SimBackend {
+ public:
+  // Throws std::runtime_error when the robot cannot stand at its start.
+  SimBackend(const MissionConfig& config, const SiteTasks& tasks, SimSite site, int threads);
+
+  hal::Clock& clock() { return clock_; }
+  hal::Devices& devices() { return devices_; }
+  boost::asio::io_context& io() { return io_; }
+  // Runs until done() holds, or nothing is left to run.
+  bool run(const std::function<bool()>& done) { return clock_.run(done); }
+
+  // Puts the true poses beside the believed ones and counts the surface that was to be seen.
+  Truth judge(RunRecord& record, const SiteModel& model, const std::vector<AreaTask>& tasks) const;
+
+ private:
+  void judge_poses(RunRecord& record, Truth& truth) const;
+  void judge_surface(const RunRecord& record, const SiteModel& model,
+                     const std::vector<AreaTask>& tasks, Truth& truth) const;
+
+  const MissionConfig config_;
+  const int threads_;
+  SimSite site_;
+  sim::Scene scene_;
+  boost::asio::io_context io_{1};
+  sim::SimClock clock_{io_};
+  sim::World world_;
+  sim::Robot robot_;
+  hal::Devices devices_;
+};
+
+}  // namespace mission

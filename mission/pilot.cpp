@@ -1,0 +1,151 @@
+#include "mission/pilot.hpp"
+
+#include <fmt/format.h>
+
+#include <boost/asio/experimental/awaitable_operators.hpp>
+#include <numbers>
+
+namespace mission {
+namespace {
+
+constexpr hal::Duration kControlPeriod = std::chrono::milliseconds(50);
+constexpr double kObstacleAheadM = 0.35;  // Beyond the bumper, when something was touched.
+constexpr double kTouchedSideM = 0.6;     // Square that is closed around the spot.
+constexpr double kBackOffM = 0.5;
+
+constexpr double radians(double degrees) {
+  return degrees * std::numbers::pi / 180;
+}
+
+nav::LocalizerConfig localizer_config(const RobotConfig& robot) {
+  nav::LocalizerConfig config;
+  config.track_m = robot.body.track_m;
+  config.slip_sigma = robot.sim.slip_sigma;
+  config.gyro_sigma_radps = radians(robot.sim.gyro_sigma_degps);
+  return config;
+}
+
+nav::FollowConfig follow_config(const BodyConfig& body) {
+  nav::FollowConfig config;
+  config.speed_max_mps = body.speed_max_mps;
+  config.turn_max_radps = radians(body.turn_max_degps);
+  config.robot_radius_m = body.radius_m;
+  config.period_s = hal::seconds(kControlPeriod);
+  return config;
+}
+
+// The start pose comes from survey marks or the operator's care: a few centimetres, a degree.
+Eigen::Matrix3d start_covariance() {
+  return Eigen::Vector3d{0.05 * 0.05, 0.05 * 0.05, radians(1) * radians(1)}.asDiagonal();
+}
+
+}  // namespace
+
+Pilot::Pilot(const RobotConfig& config, hal::Clock& clock, hal::Devices& devices, hal::Pose2 start)
+    : config_(config),
+      clock_(clock),
+      devices_(devices),
+      localizer_(localizer_config(config), start, start_covariance()) {}
+
+hal::Task<void> Pilot::track() {
+  using boost::asio::experimental::awaitable_operators::operator&&;
+  co_await (track_travel() && track_imu() && track_gnss());
+}
+
+hal::Task<void> Pilot::track_travel() {
+  for (;;) {
+    const hal::WheelTravel travel = (co_await devices_.drive.next_travel()).value();
+    localizer_.predict(travel);
+    travelled_m_ += std::abs(travel.left_m + travel.right_m) / 2;
+  }
+}
+
+hal::Task<void> Pilot::track_imu() {
+  for (;;) localizer_.predict((co_await devices_.imu.next_sample()).value());
+}
+
+hal::Task<void> Pilot::track_gnss() {
+  for (;;) localizer_.correct((co_await devices_.gnss.next_fix()).value());
+}
+
+hal::Task<LegEnd> Pilot::drive_to(Roads& roads, hal::Pose2 goal) {
+  LegEnd leg;
+  const double before_m = travelled_m_;
+  for (int tries = 0; tries < kTriesMax && !leg.arrived; ++tries) {
+    nav::NoRoute why{};
+    const auto route = roads.roadmap().route(pose().position_m, goal.position_m, &why);
+    if (!route) {
+      leg.reason = nav::name(why);
+      break;
+    }
+    const RouteEnd end = co_await follow_route(*route, goal, leg);
+    leg.arrived = end == RouteEnd::arrived;
+    if (end != RouteEnd::blocked) continue;  // There, or from here by another route.
+    leg.reason = fmt::format("the way was blocked {} times", tries + 1);
+    const hal::Pose2 here = pose();
+    const Eigen::Vector2d ahead{std::cos(here.heading_rad), std::sin(here.heading_rad)};
+    co_await back_off();
+    roads.close({here.position_m + (config_.body.radius_m + kObstacleAheadM) * ahead},
+                kTouchedSideM);
+  }
+  leg.driven_m = travelled_m_ - before_m;
+  if (leg.arrived) leg.reason.clear();
+  co_return leg;
+}
+
+// Three times what the way should take, and a minute.
+hal::Duration Pilot::time_allowed(const nav::Route& route) const {
+  return hal::from_seconds(60 + 3 * route.length_m / config_.body.speed_max_mps +
+                           static_cast<double>(route.points_m.size()) * 2 * std::numbers::pi /
+                               radians(config_.body.turn_max_degps));
+}
+
+hal::Task<Pilot::RouteEnd> Pilot::follow_route(const nav::Route& route, hal::Pose2 goal,
+                                               LegEnd& leg) {
+  const nav::FollowConfig config = follow_config(config_.body);
+  const nav::Path path = nav::path_along(route, goal.heading_rad);
+  nav::FollowState state;
+  const hal::Time late = clock_.now() + time_allowed(route);
+  RouteEnd end = RouteEnd::given_up;
+  leg.reason = "the robot did not get there in the time allowed";
+  while (clock_.now() < late) {
+    note_track(leg);
+    const hal::Twist twist = nav::follow(config, state, path, pose());
+    if (nav::done(state)) {
+      if (state.phase == nav::FollowPhase::arrived) end = RouteEnd::arrived;
+      leg.reason = nav::name(state.phase);
+      break;
+    }
+    if (!co_await devices_.drive.command(twist)) {
+      end = RouteEnd::blocked;
+      break;
+    }
+    co_await clock_.sleep_for(kControlPeriod);
+  }
+  co_await halt();
+  co_return end;
+}
+
+// Stops, and waits until the robot stands still.
+hal::Task<void> Pilot::halt() {
+  (co_await devices_.drive.command({})).value();
+  co_await clock_.sleep_for(std::chrono::seconds(2));
+}
+
+hal::Task<void> Pilot::back_off() {
+  const double until_m = travelled_m_ + kBackOffM;
+  const hal::Time late = clock_.now() + std::chrono::seconds(5);
+  while (travelled_m_ < until_m && clock_.now() < late) {
+    if (!co_await devices_.drive.command({.forward_mps = -0.2, .turn_radps = 0})) break;
+    co_await clock_.sleep_for(kControlPeriod);
+  }
+  co_await halt();
+}
+
+void Pilot::note_track(LegEnd& leg) const {
+  const Eigen::Vector2d here_m = pose().position_m;
+  if (leg.track_m.empty() || (leg.track_m.back() - here_m).norm() >= 1.0)
+    leg.track_m.push_back(here_m);
+}
+
+}  // namespace mission

@@ -1,0 +1,61 @@
+// Knows where the robot is and drives it along the roadmap: the loops between nav's pure functions
+// and the devices.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "hal/clock.hpp"
+#include "hal/devices.hpp"
+#include "mission/config.hpp"
+#include "mission/roads.hpp"
+#include "nav/follow.hpp"
+#include "nav/localizer.hpp"
+
+namespace mission {
+
+// How a leg ended. Not arrived: why, in words for the operator.
+struct LegEnd {
+  bool arrived{};
+  std::string reason;
+  double driven_m{};
+  std::vector<Eigen::Vector2d> track_m;  // Believed positions, about one per metre.
+};
+
+class Pilot {
+ public:
+  Pilot(const RobotConfig& config, hal::Clock& clock, hal::Devices& devices, hal::Pose2 start);
+
+  // Runs beside the mission and keeps the pose current; ends only by cancellation or when a device
+  // is gone for good (throws boost::system::system_error).
+  hal::Task<void> track();
+
+  // Drives to the goal, at most kTriesMax routes: when the way turns out to be blocked, closes
+  // that spot on the roads and looks for another way.
+  hal::Task<LegEnd> drive_to(Roads& roads, hal::Pose2 goal);
+
+  hal::Pose2 pose() const { return localizer_.pose(); }
+  Eigen::Matrix3d covariance() const { return localizer_.covariance(); }
+
+ private:
+  static constexpr int kTriesMax = 3;
+  enum class RouteEnd { arrived, blocked, given_up };
+
+  hal::Task<void> track_travel();
+  hal::Task<void> track_imu();
+  hal::Task<void> track_gnss();
+  hal::Task<RouteEnd> follow_route(const nav::Route& route, hal::Pose2 goal, LegEnd& leg);
+  hal::Task<void> back_off();
+  hal::Task<void> halt();
+  hal::Duration time_allowed(const nav::Route& route) const;
+  void note_track(LegEnd& leg) const;
+
+  const RobotConfig config_;
+  hal::Clock& clock_;
+  hal::Devices& devices_;
+  nav::Localizer localizer_;
+  double travelled_m_{};  // By the wheels, since the start.
+};
+
+}  // namespace mission

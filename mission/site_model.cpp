@@ -1,0 +1,225 @@
+#include "mission/site_model.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "nav/polygons.hpp"
+
+namespace mission {
+namespace {
+
+// The ground lies this far up in its layer (in voxels).
+constexpr double kGroundInLayer = 0.9;
+
+// Obstacles that the map lacks: points at the height of the robot's body, seen from near enough
+// that a heading error of 0.5 deg stays below the distance kept from known walls.
+constexpr double kBodyLowM = 0.3;
+constexpr double kBodyHighM = 1.6;
+constexpr float kObstacleRangeMaxM = 40.0F;
+constexpr std::int64_t kKnownWallMarginMm = 600;
+constexpr std::uint8_t kObstacleHitsMin = 4;
+
+struct Bounds {
+  Eigen::Vector2d low{1e18, 1e18}, high{-1e18, -1e18};
+
+  void add(const nav::Polygons& polygons) {
+    for (const nav::Polygon& polygon : polygons)
+      for (const nav::PointMm vertex : polygon.outer) {
+        low = low.cwiseMin(nav::to_m(vertex));
+        high = high.cwiseMax(nav::to_m(vertex));
+      }
+  }
+};
+
+bool scanned(const AreaTask& task) {
+  return task.mode != AreaMode::skip;
+}
+
+planning::ViewLimits view_limits(const ScannerConfig& scanner) {
+  return {.range_min_m = scanner.range_min_m,
+          .range_max_m = scanner.range_max_m,
+          .grazing_max_deg = scanner.grazing_max_deg};
+}
+
+std::size_t index_of(const planning::VoxelGrid& grid, const planning::Voxel& v) {
+  return (static_cast<std::size_t>(v.z) * static_cast<std::size_t>(grid.ny) +
+          static_cast<std::size_t>(v.y)) *
+             static_cast<std::size_t>(grid.nx) +
+         static_cast<std::size_t>(v.x);
+}
+
+}  // namespace
+
+planning::VoxelGrid voxel_grid(const MissionConfig& config, const nav::SiteMap& map,
+                               const std::vector<AreaTask>& tasks) {
+  const double voxel_m = config.phase2.voxel_m;
+  Bounds bounds;
+  bounds.add(map.boundary);
+  double ground_low_m = map.ground_z_m;
+  for (const AreaTask& task : tasks) {
+    bounds.add(task.area.drivable);
+    ground_low_m = std::min(ground_low_m, task.area.ground_z_m);
+  }
+  planning::VoxelGrid grid;
+  grid.voxel_m = voxel_m;
+  grid.W_min_m << voxel_m * (std::floor(bounds.low.x() / voxel_m) - 1),
+      voxel_m * (std::floor(bounds.low.y() / voxel_m) - 1), ground_low_m - kGroundInLayer * voxel_m;
+  grid.nx = static_cast<int>(std::ceil((bounds.high.x() - grid.W_min_m.x()) / voxel_m)) + 1;
+  grid.ny = static_cast<int>(std::ceil((bounds.high.y() - grid.W_min_m.y()) / voxel_m)) + 1;
+  grid.nz = static_cast<int>(std::ceil(config.phase2.height_m / voxel_m)) + 1;
+  return grid;
+}
+
+SiteModel::SiteModel(const MissionConfig& config, const nav::SiteMap& map,
+                     std::vector<AreaTask> tasks, int threads)
+    : config_(config),
+      tasks_(std::move(tasks)),
+      threads_(threads),
+      map_(voxel_grid(config, map, tasks_)) {
+  find_cells();
+  const planning::VoxelGrid& grid = map_.grid();
+  tries_.assign(grid.size(), 0);
+  excluded_.assign(cells_.size(), 0);
+  obstacle_grid_ = {grid.W_min_m.head<2>(), kObstacleCellM,
+                    static_cast<int>(std::ceil(grid.nx * grid.voxel_m / kObstacleCellM)),
+                    static_cast<int>(std::ceil(grid.ny * grid.voxel_m / kObstacleCellM))};
+  open_.assign(obstacle_grid_.size(), 0);
+  hits_.assign(obstacle_grid_.size(), 0);
+  for (const AreaTask& task : tasks_) {
+    const auto open =
+        nav::rasterize(nav::offset(task.area.drivable, -kKnownWallMarginMm), obstacle_grid_);
+    for (std::size_t i = 0; i < open.size(); ++i) open_[i] |= open[i];
+  }
+}
+
+// Every voxel at scanner height whose centre is a place to stand.
+void SiteModel::find_cells() {
+  const planning::VoxelGrid& grid = map_.grid();
+  const nav::RasterGrid raster{grid.W_min_m.head<2>(), grid.voxel_m, grid.nx, grid.ny};
+  for (std::size_t t = 0; t < tasks_.size(); ++t) {
+    if (!scanned(tasks_[t])) continue;
+    const nav::FreeArea& area = tasks_[t].area;
+    const double scanner_z_m = area.ground_z_m + config_.robot.scanner.height_m;
+    const int z = grid.voxel_at({grid.W_min_m.x(), grid.W_min_m.y(), scanner_z_m}).z;
+    if (z < 0 || z >= grid.nz) continue;
+    const auto inside = nav::rasterize(area.standable, raster);
+    for (int y = 0; y < grid.ny; ++y)
+      for (int x = 0; x < grid.nx; ++x)
+        if (inside[raster.index(x, y)]) cells_.push_back({{x, y, z}, static_cast<int>(t)});
+  }
+}
+
+Eigen::Vector3d SiteModel::cell_position_m(const ViewCell& cell) const {
+  Eigen::Vector3d position_m = map_.grid().center_m(cell.voxel);
+  position_m.z() =
+      tasks_[static_cast<std::size_t>(cell.task)].area.ground_z_m + config_.robot.scanner.height_m;
+  return position_m;
+}
+
+ScanEffect SiteModel::add(const hal::ScanCloud& scan,
+                          const std::vector<Eigen::Vector3f>& W_points_m,
+                          const Eigen::Isometry3d& T_W_S, double ground_z_m) {
+  planning::InsertConfig insert;
+  insert.range_min_m = config_.robot.scanner.range_min_m;
+  insert.range_max_m = config_.robot.scanner.range_max_m;
+  insert.carve_no_return = config_.phase2.carve_no_return;
+  insert.ground_z_m = ground_z_m;
+  insert.threads = threads_;
+  const planning::InsertReport report = map_.insert(scan, T_W_S, insert);
+  boundary_ = planning::boundary_unseen(map_);
+
+  ScanEffect effect;
+  effect.points_outside_box = report.returns_outside;
+  const Eigen::Vector3f W_scanner_m = T_W_S.translation().cast<float>();
+  for (const Eigen::Vector3f& W_point_m : W_points_m)
+    if ((W_point_m - W_scanner_m).squaredNorm() < kObstacleRangeMaxM * kObstacleRangeMaxM)
+      note_obstacle(W_point_m, ground_z_m, effect);
+  return effect;
+}
+
+void SiteModel::note_obstacle(const Eigen::Vector3f& W_point_m, double ground_z_m,
+                              ScanEffect& effect) {
+  const double above_m = W_point_m.z() - ground_z_m;
+  if (above_m < kBodyLowM || above_m > kBodyHighM) return;
+  const Eigen::Vector2d q =
+      (W_point_m.head<2>().cast<double>() - obstacle_grid_.W_min_m) / obstacle_grid_.cell_m;
+  const int x = static_cast<int>(std::floor(q.x()));
+  const int y = static_cast<int>(std::floor(q.y()));
+  if (!obstacle_grid_.contains(x, y)) return;
+  const std::size_t cell = obstacle_grid_.index(x, y);
+  if (!open_[cell] || hits_[cell] >= kObstacleHitsMin) return;
+  if (++hits_[cell] == kObstacleHitsMin)
+    effect.new_obstacles_m.push_back(obstacle_grid_.center_m(x, y));
+}
+
+std::vector<planning::BoundaryVoxel> SiteModel::worth_seeing() const {
+  std::vector<planning::BoundaryVoxel> worth;
+  worth.reserve(boundary_.size());
+  for (const planning::BoundaryVoxel& u : boundary_)
+    if (tries_[index_of(map_.grid(), u.v)] < kTriesMax) worth.push_back(u);
+  return worth;
+}
+
+std::vector<NextView> SiteModel::next_views() {
+  std::vector<std::size_t> open;  // Indices of cells that may be asked for.
+  std::vector<planning::Voxel> candidates;
+  for (std::size_t i = 0; i < cells_.size(); ++i) {
+    if (excluded_[i] || map_.at(cells_[i].voxel) != planning::VoxelState::seen_empty) continue;
+    open.push_back(i);
+    candidates.push_back(cells_[i].voxel);
+  }
+  const std::vector<std::uint32_t> counts = planning::tally(
+      map_, worth_seeing(), candidates, view_limits(config_.robot.scanner), threads_);
+
+  best_voxels_ = 0;
+  std::vector<NextView> views;
+  for (std::size_t i = 0; i < open.size(); ++i) {
+    best_voxels_ = std::max<std::uint64_t>(best_voxels_, counts[i]);
+    if (counts[i] < static_cast<std::uint32_t>(config_.phase2.gain_min_voxels) || counts[i] == 0)
+      continue;
+    const ViewCell& cell = cells_[open[i]];
+    views.push_back({.cell = cell,
+                     .pose = {cell_position_m(cell).head<2>(), 0},
+                     .ground_z_m = tasks_[static_cast<std::size_t>(cell.task)].area.ground_z_m,
+                     .voxels = counts[i]});
+  }
+  std::ranges::stable_sort(views, std::ranges::greater{}, &NextView::voxels);
+  return views;
+}
+
+void SiteModel::expect(const NextView& view) {
+  const auto worth = worth_seeing();
+  expected_.clear();
+  for (const std::uint32_t i :
+       planning::visible_from(map_, worth, view.cell.voxel, view_limits(config_.robot.scanner)))
+    expected_.push_back(worth[i].v);
+}
+
+std::uint64_t SiteModel::settle() {
+  std::uint64_t resolved = 0;
+  for (const planning::Voxel& v : expected_) {
+    if (map_.at(v) != planning::VoxelState::unseen) {
+      ++resolved;
+    } else if (++tries_[index_of(map_.grid(), v)] == kTriesMax) {
+      ++set_aside_;
+    }
+  }
+  expected_.clear();
+  return resolved;
+}
+
+void SiteModel::exclude(const planning::Voxel& cell) {
+  for (std::size_t i = 0; i < cells_.size(); ++i)
+    if (cells_[i].voxel == cell) excluded_[i] = 1;
+}
+
+VoxelCounts SiteModel::counts() const {
+  const auto counts = map_.counts();
+  return {.seen_empty = counts.seen_empty,
+          .seen_occupied = counts.seen_occupied,
+          .unseen = counts.unseen,
+          .boundary_unseen = boundary_.size()};
+}
+
+}  // namespace mission

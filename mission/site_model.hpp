@@ -1,0 +1,101 @@
+// What the mission knows of the site in 3-D: the voxel map, what is still worth looking at, and the
+// obstacles that the 2-D map lacks. Values only; waits for nothing.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "mission/config.hpp"
+#include "mission/plan.hpp"
+#include "mission/record.hpp"
+#include "nav/raster.hpp"
+#include "planning/next_best_view.hpp"
+#include "planning/voxel_map.hpp"
+
+namespace mission {
+
+// The voxel box: x and y hold the areas and the obstacles that face them; z from the lowest ground,
+// which lies 0.1 voxel below the top of its layer, so that range noise on the ground stays in the
+// layer and beams that skim the ground do not carve it.
+planning::VoxelGrid voxel_grid(const MissionConfig& config, const nav::SiteMap& map,
+                               const std::vector<AreaTask>& tasks);
+
+// A place where a next best view may be taken.
+struct ViewCell {
+  planning::Voxel voxel;  // Holds the scanner.
+  int task{};             // Index into the tasks.
+};
+
+// A possible next view and how many boundary unseen voxels it counts.
+struct NextView {
+  ViewCell cell;
+  hal::Pose2 pose;
+  double ground_z_m{};
+  std::uint32_t voxels{};
+};
+
+// What one scan did to the model.
+struct ScanEffect {
+  std::uint64_t points_outside_box{};
+  std::vector<Eigen::Vector2d>
+      new_obstacles_m;  // Centres of 0.25 m cells that the map has as free.
+};
+
+class SiteModel {
+ public:
+  static constexpr double kObstacleCellM = 0.25;
+
+  SiteModel(const MissionConfig& config, const nav::SiteMap& map, std::vector<AreaTask> tasks,
+            int threads);
+
+  // Merges a scan taken from the ground at ground_z_m; T_W_S is the scanner's believed pose and
+  // W_points_m the scan's points seen from there (scan_points).
+  ScanEffect add(const hal::ScanCloud& scan, const std::vector<Eigen::Vector3f>& W_points_m,
+                 const Eigen::Isometry3d& T_W_S, double ground_z_m);
+
+  // Candidates by gain, best first, ties to the lowest index; those below the threshold are left
+  // out. Empty: no view would add enough. best_voxels() tells the maximum all the same.
+  std::vector<NextView> next_views();
+  std::uint64_t best_voxels() const { return best_voxels_; }
+
+  // Takes note that a view is about to be taken at the cell: what it should resolve.
+  void expect(const NextView& view);
+  // After add(): how many of the expected voxels are no longer unseen. Those that still are have
+  // used up one of their tries; after tries_max they are set aside, so that the mission ends.
+  std::uint64_t settle();
+  std::uint64_t set_aside() const { return set_aside_; }
+
+  // Never ask for a view from this cell again.
+  void exclude(const planning::Voxel& cell);
+
+  VoxelCounts counts() const;
+  const planning::VoxelMap& map() const { return map_; }
+  const std::vector<ViewCell>& cells() const { return cells_; }
+  Eigen::Vector3d cell_position_m(const ViewCell& cell) const;
+
+ private:
+  static constexpr int kTriesMax = 2;
+
+  void find_cells();
+  std::vector<planning::BoundaryVoxel> worth_seeing() const;
+  void note_obstacle(const Eigen::Vector3f& W_point_m, double ground_z_m, ScanEffect& effect);
+
+  const MissionConfig config_;
+  const std::vector<AreaTask> tasks_;
+  const int threads_;
+  planning::VoxelMap map_;
+  std::vector<planning::BoundaryVoxel> boundary_;
+  std::vector<ViewCell> cells_;
+  std::vector<std::uint8_t> tries_;     // Per voxel.
+  std::vector<std::uint8_t> excluded_;  // Per cells_ index.
+  std::vector<planning::Voxel> expected_;
+  std::uint64_t best_voxels_{};
+  std::uint64_t set_aside_{};
+
+  nav::RasterGrid obstacle_grid_;
+  std::vector<std::uint8_t> open_;  // 1 where the map says free, well away from every known wall.
+  std::vector<std::uint8_t> hits_;  // Points seen there at the height of the robot, up to 255.
+};
+
+}  // namespace mission

@@ -1,0 +1,354 @@
+#include "mission/survey.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <boost/asio/experimental/awaitable_operators.hpp>
+#include <boost/system/system_error.hpp>
+#include <numbers>
+
+namespace mission {
+namespace {
+
+namespace json = boost::json;
+
+json::array point_json(const Eigen::Vector2d& p) {
+  return {p.x(), p.y()};
+}
+
+json::object pose_json(const hal::Pose2& pose) {
+  return {{"x_m", pose.position_m.x()},
+          {"y_m", pose.position_m.y()},
+          {"heading_deg", pose.heading_rad * 180 / std::numbers::pi}};
+}
+
+hal::Pose2 pose_of(const planning::Candidate& at) {
+  return {nav::to_m(at.position), at.heading_rad};
+}
+
+// The scanner stands upright at its height above the ground.
+Eigen::Isometry3d scanner_pose(const hal::Pose2& pose, double ground_z_m, double height_m) {
+  Eigen::Isometry3d T_W_S = Eigen::Isometry3d::Identity();
+  T_W_S.translation() << pose.position_m, ground_z_m + height_m;
+  T_W_S.linear() = Eigen::AngleAxisd(pose.heading_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  return T_W_S;
+}
+
+// The covariance in two numbers: along the worse axis, and of the heading.
+void note_sigmas(ScanRecord& scan) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(scan.covariance.topLeftCorner<2, 2>());
+  scan.sigma_position_m = std::sqrt(axes.eigenvalues().maxCoeff());
+  scan.sigma_heading_rad = std::sqrt(scan.covariance(2, 2));
+}
+
+json::object plan_json(const AreaPlan& plan) {
+  json::array stations;
+  for (const int s : plan.tour) {
+    const planning::Station& station = plan.cover.stations[static_cast<std::size_t>(s)];
+    json::object entry{{"name", station_name(plan, s)}};
+    for (const auto& [key, value] : pose_json(pose_of(station.at))) entry[key] = value;
+    entry["sees_m"] = station.sees_m;
+    entry["adds_m"] = station.adds_m;
+    entry["overlaps_m"] = station.overlaps_m;
+    stations.push_back(std::move(entry));
+  }
+  return {{"area", plan.area.name},
+          {"mode", plan.mode},
+          {"candidates", plan.cover.candidates.size()},
+          {"target_m", plan.cover.target_m},
+          {"coverable_m", plan.cover.coverable_m},
+          {"covered_m", plan.cover.covered_m},
+          {"tour_m", plan.tour_m},
+          {"stations", std::move(stations)},
+          {"end", plan.cover.end}};
+}
+
+}  // namespace
+
+struct Survey::Stop {
+  std::string name;
+  int task{};
+  hal::Pose2 pose;
+  const planning::Station* station{};  // Phase I
+  const NextView* view{};              // Phase II
+};
+
+Survey::Survey(const MissionConfig& config, const nav::SiteMap& map, SiteTasks tasks, int threads,
+               Parts parts)
+    : config_(config),
+      map_(map),
+      tasks_(std::move(tasks)),
+      threads_(threads),
+      parts_(parts),
+      pilot_(config.robot, parts.clock, parts.devices, tasks_.start),
+      model_(config, map, tasks_.tasks, threads) {
+  record_.mission = config.name;
+  record_.site = map.name;
+  record_.robot = config.robot.name;
+  record_.seed = config.seed;
+  record_.map = map;
+  record_.notes = tasks_.notes;
+  record_.voxel_m = config.phase2.voxel_m;
+  record_.gain_min_voxels = config.phase2.gain_min_voxels;
+}
+
+hal::Task<void> Survey::run() {
+  std::exception_ptr failure;
+  try {
+    plan_stations();
+    // The survey decides when it is over; the pilot only keeps it company.
+    using boost::asio::experimental::awaitable_operators::operator||;
+    co_await (survey() || pilot_.track());
+  } catch (const boost::system::system_error& error) {
+    record_.end = fmt::format("a device failed: {}", error.what());
+    failure = std::current_exception();
+  }
+  record_.mission_s = now_s();
+  decide({{"t_s", now_s()},
+          {"decision", "end"},
+          {"completed", record_.completed},
+          {"reason", record_.end}});
+  if (failure) std::rethrow_exception(failure);
+}
+
+hal::Task<void> Survey::survey() {
+  for (std::size_t t = 0; t < record_.plans.size(); ++t) co_await tour(t);
+  co_await refine();
+  co_await go_home();
+  record_.completed = true;
+}
+
+void Survey::plan_stations() {
+  for (std::size_t t = 0; t < tasks_.tasks.size(); ++t) {
+    const AreaTask& task = tasks_.tasks[t];
+    if (task.mode == AreaMode::skip) continue;
+    std::optional<Eigen::Vector2d> start_m;
+    if (static_cast<int>(t) == tasks_.start_area) start_m = tasks_.start.position_m;
+    PlannedArea planned = plan_area(config_, map_, task, start_m, config_.seed + t, threads_);
+    json::object decision{{"t_s", now_s()}, {"decision", "stations"}};
+    for (auto& [key, value] : plan_json(planned.plan)) decision[key] = value;
+    decide(std::move(decision));
+    for (const DroppedStation& station : planned.unreachable) record_.dropped.push_back(station);
+    stations_planned_ += planned.plan.tour.size();
+    target_m_ += planned.plan.cover.coverable_m;
+    record_.plans.push_back(std::move(planned.plan));
+    roads_.push_back(std::move(planned.roads));
+  }
+}
+
+hal::Task<void> Survey::tour(std::size_t t) {
+  const AreaPlan& plan = record_.plans[t];
+  for (const int s : plan.tour) {
+    const planning::Station& station = plan.cover.stations[static_cast<std::size_t>(s)];
+    co_await visit({.name = station_name(plan, s),
+                    .task = static_cast<int>(t),
+                    .pose = pose_of(station.at),
+                    .station = &station,
+                    .view = nullptr});
+    ++stations_done_;
+    covered_m_ += station.adds_m;
+  }
+}
+
+hal::Task<void> Survey::refine() {
+  for (int taken = 0; taken < config_.phase2.views_max;) {
+    const std::vector<NextView> views = choose_views();
+    if (views.empty()) {
+      record_.end = fmt::format(
+          "no next best view would see {} or more unseen voxels (the best sees {}){}",
+          config_.phase2.gain_min_voxels, model_.best_voxels(),
+          model_.set_aside()
+              ? fmt::format("; {} voxels stayed unseen after two tries each", model_.set_aside())
+              : "");
+      co_return;
+    }
+    // The best that can be reached; the others stay excluded.
+    bool done = false;
+    for (std::size_t i = 0; i < views.size() && !done; ++i) {
+      model_.exclude(views[i].cell.voxel);
+      done = co_await visit({.name = fmt::format("NBV {}", taken + 1),
+                             .task = views[i].cell.task,
+                             .pose = views[i].pose,
+                             .station = nullptr,
+                             .view = &views[i]});
+    }
+    if (!done) {
+      record_.end = "none of the views that would add enough can be reached";
+      co_return;
+    }
+    views_taken_ = ++taken;
+  }
+  record_.end = fmt::format("took views_max = {} next best views", config_.phase2.views_max);
+}
+
+std::vector<NextView> Survey::choose_views() {
+  std::vector<NextView> views = model_.next_views();
+  if (!record_.scans.empty()) record_.scans.back().visible_to_next = model_.best_voxels();
+  json::object decision{{"t_s", now_s()},
+                        {"decision", "next_best_view"},
+                        {"best_voxels", model_.best_voxels()},
+                        {"gain_min_voxels", config_.phase2.gain_min_voxels},
+                        {"views_above", views.size()}};
+  if (!views.empty()) {
+    decision["area"] = task(views.front().cell.task).area.name;
+    decision["at_m"] = point_json(views.front().pose.position_m);
+  }
+  decide(std::move(decision));
+  return views;
+}
+
+// Goes to the stop by robot or by hand and scans. False: dropped, with the reason on record.
+hal::Task<bool> Survey::visit(const Stop& stop) {
+  show(stop);
+  ScanRecord scan;
+  scan.name = stop.name;
+  scan.area = task(stop.task).area.name;
+  scan.next_best_view = stop.view != nullptr;
+  scan.planned = stop.pose;
+  scan.ground_z_m = task(stop.task).area.ground_z_m;
+  scan.by_hand = task(stop.task).mode == AreaMode::manual;
+  if (stop.station) {
+    scan.adds_m = stop.station->adds_m;
+    scan.overlaps_m = stop.station->overlaps_m;
+  }
+  const bool there = scan.by_hand ? co_await carry(stop, scan) : co_await drive(stop, scan);
+  if (!there) co_return false;
+  co_await acquire(stop, std::move(scan));
+  co_return true;
+}
+
+hal::Task<bool> Survey::drive(const Stop& stop, ScanRecord& scan) {
+  if (stop.task != tasks_.start_area) {
+    drop(stop, fmt::format("the robot is in area '{}' and no road leads to '{}'",
+                           task(tasks_.start_area).area.name, task(stop.task).area.name));
+    co_return false;
+  }
+  const LegEnd leg =
+      co_await pilot_.drive_to(roads_[static_cast<std::size_t>(stop.task)], stop.pose);
+  scan.driven_m = leg.driven_m;
+  record_.driven_total_m += leg.driven_m;
+  record_.driven_m.push_back(leg.track_m);
+  decide({{"t_s", now_s()},
+          {"decision", "leg"},
+          {"to", stop.name},
+          {"arrived", leg.arrived},
+          {"driven_m", leg.driven_m},
+          {"reason", leg.reason}});
+  if (!leg.arrived) drop(stop, leg.reason);
+  co_return leg.arrived;
+}
+
+hal::Task<bool> Survey::carry(const Stop& stop, ScanRecord& scan) {
+  const auto placed = co_await parts_.devices.placement.place(task(stop.task).area.name, stop.pose);
+  if (!placed) {
+    drop(stop, fmt::format("nobody can set up the scanner there: {}", placed.error().message()));
+    co_return false;
+  }
+  scan.believed = placed->pose;
+  const Eigen::Vector3d sigmas{placed->position_sigma_m, placed->position_sigma_m,
+                               placed->heading_sigma_rad};
+  scan.covariance = sigmas.cwiseAbs2().asDiagonal();
+  note_sigmas(scan);
+  co_return true;
+}
+
+hal::Task<void> Survey::acquire(const Stop& stop, ScanRecord scan) {
+  scan.number = static_cast<int>(record_.scans.size()) + 1;
+  scan.start_s = now_s();
+  const hal::ScanCloud cloud = (co_await parts_.devices.scanner.scan()).value();
+  scan.end_s = now_s();
+  if (!scan.by_hand) {
+    // The localizer has used the time: this pose is better than the one on arrival.
+    scan.believed = pilot_.pose();
+    scan.covariance = pilot_.covariance();
+    note_sigmas(scan);
+  }
+  merge(cloud, stop, scan);
+}
+
+void Survey::merge(const hal::ScanCloud& cloud, const Stop& stop, ScanRecord& scan) {
+  const Eigen::Isometry3d T_W_S =
+      scanner_pose(scan.believed, scan.ground_z_m, config_.robot.scanner.height_m);
+  const std::vector<Eigen::Vector3f> W_points_m = scan_points(cloud, T_W_S);
+  // Durable before it counts.
+  parts_.store
+      .save_scan(
+          W_points_m, T_W_S,
+          {.number = scan.number, .station = scan.name, .time_s = scan.end_s, .seed = config_.seed})
+      .value();
+  cloud_.add(W_points_m);
+  if (stop.view) {
+    model_.expect(*stop.view);
+    scan.predicted_voxels = stop.view->voxels;
+  }
+  const ScanEffect effect = model_.add(cloud, W_points_m, T_W_S, scan.ground_z_m);
+  if (stop.view) scan.resolved_voxels = model_.settle();
+  scan.beams = cloud.pattern.beams();
+  scan.points = W_points_m.size();
+  scan.points_outside_box = effect.points_outside_box;
+  scan.after = model_.counts();
+  close_roads(effect.new_obstacles_m);
+  decide({{"t_s", now_s()},
+          {"decision", "scan"},
+          {"number", scan.number},
+          {"name", scan.name},
+          {"believed", pose_json(scan.believed)},
+          {"sigma_position_m", scan.sigma_position_m},
+          {"points", scan.points},
+          {"seen_occupied", scan.after.seen_occupied},
+          {"seen_empty", scan.after.seen_empty},
+          {"unseen", scan.after.unseen},
+          {"boundary_unseen", scan.after.boundary_unseen},
+          {"predicted_voxels", scan.predicted_voxels},
+          {"resolved_voxels", scan.resolved_voxels},
+          {"new_obstacle_cells", effect.new_obstacles_m.size()}});
+  record_.scans.push_back(std::move(scan));
+}
+
+// What the scans show and the map lacks closes the robot's roads through it.
+void Survey::close_roads(const std::vector<Eigen::Vector2d>& obstacles_m) {
+  if (tasks_.start_area < 0) return;
+  roads_[static_cast<std::size_t>(tasks_.start_area)].close(obstacles_m, SiteModel::kObstacleCellM);
+}
+
+void Survey::drop(const Stop& stop, const std::string& reason) {
+  record_.dropped.push_back({stop.name, task(stop.task).area.name, stop.pose, reason});
+  decide({{"t_s", now_s()},
+          {"decision", "drop"},
+          {"name", stop.name},
+          {"at", pose_json(stop.pose)},
+          {"reason", reason}});
+}
+
+void Survey::decide(const json::object& decision) {
+  parts_.store.decide(decision).value();
+}
+
+void Survey::show(const Stop& stop) {
+  const double scanned = static_cast<double>(record_.scans.size());
+  const double left = static_cast<double>(stations_planned_ - stations_done_);
+  Progress progress;
+  progress.phase = stop.view ? "Phase II" : "Phase I";
+  progress.station = static_cast<int>(stop.view ? views_taken_ + 1 : stations_done_ + 1);
+  progress.stations = stop.view ? 0 : static_cast<int>(stations_planned_);
+  progress.area = task(stop.task).area.name;
+  if (target_m_ > 0) progress.coverage = covered_m_ / target_m_;
+  if (!record_.scans.empty()) progress.seen_occupied = record_.scans.back().after.seen_occupied;
+  progress.mission_s = now_s();
+  // What a station has taken so far, road and set-up included, is the best guess of the next one.
+  if (!stop.view && scanned > 0) progress.eta_s = now_s() / scanned * left;
+  parts_.progress.show(progress);
+}
+
+hal::Task<void> Survey::go_home() {
+  if (!config_.return_home || tasks_.start_area < 0) co_return;
+  const Stop home{.name = "home",
+                  .task = tasks_.start_area,
+                  .pose = tasks_.start,
+                  .station = nullptr,
+                  .view = nullptr};
+  ScanRecord unused;
+  co_await drive(home, unused);
+}
+
+}  // namespace mission

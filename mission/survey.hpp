@@ -1,0 +1,83 @@
+// The mission as the paper tells it, top to bottom: plan the stations, tour them, then take next
+// best views until none would add enough.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "hal/clock.hpp"
+#include "hal/devices.hpp"
+#include "mission/config.hpp"
+#include "mission/pilot.hpp"
+#include "mission/plan.hpp"
+#include "mission/ply.hpp"
+#include "mission/progress.hpp"
+#include "mission/record.hpp"
+#include "mission/site_model.hpp"
+#include "mission/store.hpp"
+
+namespace mission {
+
+class Survey {
+ public:
+  // What a survey needs; everything outlives it.
+  struct Parts {
+    hal::Clock& clock;
+    hal::Devices& devices;
+    RunStore& store;
+    ProgressPrinter& progress;
+  };
+
+  Survey(const MissionConfig& config, const nav::SiteMap& map, SiteTasks tasks, int threads,
+         Parts parts);
+
+  // Device failures that a survey cannot work around throw boost::system::system_error; the record
+  // then says how far it came.
+  hal::Task<void> run();
+
+  const RunRecord& record() const { return record_; }
+  RunRecord& record() { return record_; }
+  const SiteModel& model() const { return model_; }
+  const CloudMerger& cloud() const { return cloud_; }
+
+ private:
+  struct Stop;  // Where the next scan is to be taken, and why.
+
+  hal::Task<void> survey();
+  void plan_stations();
+  hal::Task<void> tour(std::size_t task);
+  hal::Task<void> refine();
+  hal::Task<void> go_home();
+
+  hal::Task<bool> visit(const Stop& stop);
+  hal::Task<bool> drive(const Stop& stop, ScanRecord& scan);
+  hal::Task<bool> carry(const Stop& stop, ScanRecord& scan);
+  hal::Task<void> acquire(const Stop& stop, ScanRecord scan);
+  void merge(const hal::ScanCloud& cloud, const Stop& stop, ScanRecord& scan);
+
+  std::vector<NextView> choose_views();
+  void drop(const Stop& stop, const std::string& reason);
+  void close_roads(const std::vector<Eigen::Vector2d>& obstacles_m);
+  void decide(const boost::json::object& decision);
+  void show(const Stop& stop);
+  double now_s() const { return hal::seconds(parts_.clock.now()); }
+  const AreaTask& task(int index) const { return tasks_.tasks[static_cast<std::size_t>(index)]; }
+
+  const MissionConfig config_;
+  const nav::SiteMap& map_;
+  const SiteTasks tasks_;
+  const int threads_;
+  Parts parts_;
+  Pilot pilot_;
+  SiteModel model_;
+  std::vector<Roads> roads_;  // One per planned task, in order.
+  std::size_t stations_planned_{};
+  std::size_t stations_done_{};
+  int views_taken_{};
+  double covered_m_{};
+  double target_m_{};
+  CloudMerger cloud_;
+  RunRecord record_;
+};
+
+}  // namespace mission
