@@ -18,6 +18,7 @@ struct RingRepair {
   Ring ring;
   Polygons area;
   std::vector<std::string> repairs;
+  std::string reversal;
   std::string error;
 };
 
@@ -154,8 +155,8 @@ RingRepair repair_ring(const Metres& ring_m, bool hole) {
   note_touches(repair, found);
   const bool clockwise = twice_area_mm2(repair.ring) < 0;
   if (clockwise != hole) {
-    repair.repairs.push_back(hole ? "is a hole but runs counter-clockwise; reversed"
-                                  : "is an outline but runs clockwise; reversed");
+    repair.reversal = hole ? "is a hole but runs counter-clockwise; reversed"
+                           : "is an outline but runs clockwise; reversed";
   }
   return repair;
 }
@@ -196,6 +197,7 @@ class OutlineRepair {
 
   Polygons keep(RingRepair ring, const std::string& name) {
     for (const std::string& what : ring.repairs) out_.repairs.push_back(name + " " + what);
+    if (!ring.reversal.empty()) out_.reversals.push_back(name + " " + ring.reversal);
     if (!ring.error.empty()) out_.errors.push_back(name + ": " + ring.error);
     return ring.error.empty() ? std::move(ring.area) : Polygons{};
   }
@@ -228,10 +230,7 @@ RepairedLine repair_line(const std::vector<Eigen::Vector2d>& line_m) {
     const PointMm mm = to_mm(p);
     if (repaired.line.empty() || repaired.line.back() != mm) repaired.line.push_back(mm);
   }
-  if (repaired.line.size() < 2) {
-    repaired.line.clear();
-    repaired.repair = "a line has no length; dropped";
-  }
+  if (repaired.line.size() < 2) repaired.line.clear();
   return repaired;
 }
 

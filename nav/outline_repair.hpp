@@ -13,7 +13,8 @@ namespace nav {
 struct RepairedOutline {
   Polygons area;
   std::vector<std::string> repairs;
-  std::vector<std::string> errors;  // Not empty: `area` means nothing.
+  std::vector<std::string> reversals;  // Rings that ran the wrong way round: harmless and frequent.
+  std::vector<std::string> errors;     // Not empty: `area` means nothing.
 };
 
 // polygon -> ring -> vertex in metres; the first ring of a polygon is its outline, the others are
@@ -21,11 +22,9 @@ struct RepairedOutline {
 RepairedOutline repair_outline(
     const std::vector<std::vector<std::vector<Eigen::Vector2d>>>& polygons_m);
 
-// An open line on the grid, without repeated vertices. Empty with an error when out of range, or a
-// repair when it has no length.
+// An open line on the grid, without repeated vertices; empty when it has no length or an error.
 struct RepairedLine {
   Ring line;
-  std::string repair;
   std::string error;
 };
 RepairedLine repair_line(const std::vector<Eigen::Vector2d>& line_m);

@@ -63,6 +63,7 @@ class SiteRepair {
   RepairedSite run() {
     out_.map.name = raw_.name;
     for (const RawFeature& feature : raw_.features) shapes_.push_back(shape(feature));
+    say_reversals();
     if (out_.errors.empty()) assemble();
     return std::move(out_);
   }
@@ -90,16 +91,33 @@ class SiteRepair {
     Shape shape{&feature, {}, {}};
     RepairedOutline outline = repair_outline(feature.polygons_m);
     for (const std::string& what : outline.repairs) repaired(feature, what);
+    for (const std::string& what : outline.reversals) reversals_.push_back({feature.where, what});
     for (const std::string& what : outline.errors) wrong(feature, what);
     shape.area = std::move(outline.area);
+    int dropped = 0;
     for (const auto& line_m : feature.lines_m) {
       RepairedLine line = repair_line(line_m);
-      if (!line.repair.empty()) repaired(feature, line.repair);
       if (!line.error.empty()) wrong(feature, line.error);
+      if (line.line.empty() && line.error.empty()) ++dropped;
       if (!line.line.empty()) shape.lines.push_back(std::move(line.line));
     }
+    if (dropped > 0)
+      repaired(feature, counted(dropped, "line", "lines") + " without length; dropped");
     take_lines(shape);
     return shape;
+  }
+
+  // Whole maps run the other way round: say that once.
+  void say_reversals() {
+    constexpr std::size_t kOneByOneMax = 5;
+    if (reversals_.size() > kOneByOneMax) {
+      const std::string count = std::to_string(reversals_.size());
+      reversals_ = {{raw_.name, count +
+                                    " rings run the wrong way round (outlines are "
+                                    "counter-clockwise, holes clockwise), first in " +
+                                    reversals_.front().where + "; reversed"}};
+    }
+    out_.repairs.insert(out_.repairs.end(), reversals_.begin(), reversals_.end());
   }
 
   // Lines are targets; along obstacles they are thin walls; elsewhere they enclose nothing.
@@ -289,6 +307,7 @@ class SiteRepair {
   const double margin_m_;
   RepairedSite out_;
   std::vector<Shape> shapes_;
+  std::vector<Repair> reversals_;
 };
 
 std::vector<SegmentMm> segments(const std::vector<Ring>& lines) {

@@ -180,6 +180,27 @@ TEST(RepairSite, HolesAreCutOutWhicheverWayTheyRun) {
               ElementsAre(HasSubstr("ring 1 is a hole but runs counter-clockwise; reversed")));
 }
 
+TEST(RepairSite, MapThatRunsTheOtherWayRoundIsSaidOnce) {
+  std::vector<RawFeature> features{fence()};
+  for (int i = 0; i < 6; ++i) {
+    features.push_back(
+        feature(Role::obstacle, std::to_string(i), {reversed(box(10 * i + 1, 1, 10 * i + 6, 6))}));
+  }
+  const RepairedSite site = repair(features);
+  EXPECT_DOUBLE_EQ(area_m2(site.map.obstacles), 150);
+  EXPECT_THAT(texts(site), ElementsAre(AllOf(HasSubstr("test: 6 rings run the wrong way round"),
+                                             HasSubstr("first in feature '0'; reversed"))));
+}
+
+TEST(RepairSite, LinesWithoutLengthAreDroppedAndCounted) {
+  RawFeature wall = line(Role::obstacle, "wall", {{10, 10}, {20, 10}});
+  wall.lines_m.push_back({{5, 5}, {5, 5}});
+  wall.lines_m.push_back({{6, 6}});
+  const RepairedSite site = repair({fence(), wall});
+  EXPECT_THAT(texts(site), ElementsAre(HasSubstr("2 lines without length; dropped"),
+                                       HasSubstr("taken as a wall")));
+}
+
 TEST(RepairSite, HoleThatLeavesItsOutlineIsCutAndMeasured) {
   const RepairedSite site =
       repair({fence(), feature(Role::obstacle, "court",
