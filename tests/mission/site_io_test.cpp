@@ -372,6 +372,27 @@ TEST_F(SiteFolder, MapThatCannotBeReadIsAnError) {
   EXPECT_THAT(load_site(folder_).errors, ElementsAre(HasSubstr("cannot read")));
 }
 
+// The examples of the document are what it says they are.
+TEST(MapFormat, ExamplesInTheDocumentAreCleanMaps) {
+  const FileResult<std::string> document =
+      read_file(fs::path(VANTAGE_SOURCE_DIR) / "configs/sites/FORMAT.md");
+  ASSERT_TRUE(document.has_value());
+  int examples = 0;
+  const std::string open = "```json\n";
+  for (std::size_t at = document->find(open); at != std::string::npos;
+       at = document->find(open, at + 1)) {
+    const std::size_t begin = at + open.size();
+    const LoadedSite site = parse(document->substr(begin, document->find("```", begin) - begin));
+    EXPECT_THAT(site.errors, IsEmpty());
+    EXPECT_THAT(site.notes, IsEmpty());
+    const nav::RepairedSite repaired = nav::repair_site(site.raw, 30);
+    EXPECT_THAT(repaired.errors, IsEmpty());
+    EXPECT_LE(repaired.repairs.size(), 1u);  // The first draws no boundary.
+    ++examples;
+  }
+  EXPECT_EQ(examples, 2);
+}
+
 // Maps that nobody here drew.
 TEST(RealMaps, AllAreReadRepairedAndHaveFreeSpace) {
   const fs::path data = fs::path(VANTAGE_SOURCE_DIR) / "../shared/data";
