@@ -7,48 +7,37 @@
 
 #include "nav/free_space.hpp"
 #include "nav/geometry.hpp"
+#include "nav/site_map.hpp"
+#include "planning/visibility.hpp"
 
 namespace planning {
 
-// What the scanner can image (paper 3.1.1). Angles in degrees as in the config.
-struct SensorLimits {
-  double range_min_m = 1.0;
-  double range_max_m = 100.0;
-  double grazing_max_deg = 70.0;  // Between the beam and the surface normal.
-  double fov_deg = 360.0;         // Horizontal field of view, centred on the heading.
-};
-
-// A straight piece of obstacle boundary; the free side is on the right of a -> b... see cover.cpp.
-struct Wall {
-  nav::PointMm a, b;
-  bool target = true;  // Counts for coverage; occludes either way.
-};
-
-// A part of walls[wall], in metres from its end a.
-struct WallPiece {
-  int wall{};
-  double from_m{};
-  double to_m{};
-};
-
-struct Candidate {
-  nav::PointMm position;
-  double heading_rad{};
-};
+// Every edge of the map's obstacles, for the stations of one area: all of them occlude; targets are
+// the parts that count for coverage (nav::on_target) and border the area, the drivable ground on
+// their free side. Edges are cut on the 1 mm grid where such a part begins or ends, which may bend
+// them by less than 1 mm. In the order of nav::edges.
+//
+// A wall that borders two areas only where one ends and the other begins is cut there; so each
+// stretch is a target of the area it belongs to and of no other, even where other areas see it.
+// (Parts of a region that a robot of no size could drive between share their drivable ground, and
+// so their targets.) Ground drawn beside the wall rather than up to it borders the wall if the gap
+// is at most nav::kTargetReachM and parallel within 3 deg.
+std::vector<Wall> walls_of(const nav::SiteMap& map, const nav::FreeArea& area);
 
 struct Station {
   Candidate at;
-  std::vector<WallPiece> sees;  // Target pieces only.
+  std::vector<WallPiece> sees;  // Target pieces only; in order of wall and place.
   double sees_m{};
-  double adds_m{};     // New when it was chosen.
-  double overlaps_m{}; // Already seen when it was chosen.
+  double adds_m{};      // New when it was chosen.
+  double overlaps_m{};  // Already seen when it was chosen.
 };
-
-enum class Excluded { occluded, range_max, range_min, grazing, field_of_view, overlap, gain, goal };
-std::string_view name(Excluded reason);
 
 struct UncoveredPiece {
   WallPiece piece;
+  // One of the first five: no candidate sees it. Of all candidates, this stopped the one that came
+  // furthest in the order of the constraints; `occluded` means that none has it in sight.
+  // overlap, gain, goal: candidates see it, but none was chosen. gain: at least one overlaps
+  // enough.
   Excluded reason{};
 };
 
@@ -61,12 +50,28 @@ struct CoverConfig {
 
 struct CoverPlan {
   std::vector<Candidate> candidates;
-  std::vector<Station> stations;  // In the order chosen.
-  std::vector<UncoveredPiece> uncovered;
-  double target_m{};     // All target wall of this area.
-  double coverable_m{};  // What the candidates together can see.
+  std::vector<Station> stations;          // In the order chosen.
+  std::vector<UncoveredPiece> uncovered;  // In order of wall and place; 1 mm or longer.
+  double target_m{};                      // All target wall of this area.
+  double coverable_m{};                   // What the candidates together can see.
   double covered_m{};
-  std::string end;  // Why it stopped.
+  std::string end;  // Why it stopped, in a sentence.
 };
+
+// `count` random viewpoints, uniform in the area's standable part, on the grid; with random
+// headings in [-180, 180) deg if the field of view is below 360 deg. Fewer, or none, only if hardly
+// any grid point lies within. Same seed, same candidates.
+std::vector<Candidate> draw_candidates(const nav::FreeArea& area, int count, double fov_deg,
+                                       std::uint64_t seed);
+
+// Algorithm 1: draws candidates, works out what each can image, and picks stations one by one,
+// always the one that adds the most (ties: the lowest index), among those of whose view a share of
+// overlap_min is covered already (the first station excepted). Stops at the coverage goal, when the
+// next view adds less than gain_min, when only candidates without enough overlap would add
+// anything, or when all that can be covered is. Independent of `threads`. Lengths are sums of whole
+// nanometres, so that they do not depend on the order of summation.
+CoverPlan plan_cover(const nav::FreeArea& area, const std::vector<Wall>& walls,
+                     const SensorLimits& limits, const CoverConfig& config, std::uint64_t seed,
+                     int threads);
 
 }  // namespace planning
