@@ -62,7 +62,8 @@ class Roadmap {
                              Smoothing smoothing = Smoothing::shortcut) const;
 
   // Lengths of the ways between all pairs: row from, column to; infinite where there is none.
-  // Dijkstra once per point; without smoothing it equals route().
+  // Dijkstra once per point; without smoothing it equals route(). Symmetric, but for points closer
+  // to an obstacle than the radius: such a point can be left, not reached.
   Eigen::MatrixXd lengths_m(const std::vector<Eigen::Vector2d>& points_m,
                             Smoothing smoothing = Smoothing::shortcut) const;
 

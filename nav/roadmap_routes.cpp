@@ -249,7 +249,11 @@ Eigen::MatrixXd Roadmap::lengths_m(const std::vector<Vector2d>& points_m,
   const auto n = static_cast<Eigen::Index>(points_m.size());
   Eigen::MatrixXd lengths = Eigen::MatrixXd::Constant(n, n, kInfinity);
   std::vector<std::vector<Link>> goals;
-  for (const Vector2d& p : points_m) goals.push_back(links(p, false));
+  std::vector<char> roomy;  // Between two such points the way back is the way there.
+  for (const Vector2d& p : points_m) {
+    goals.push_back(links(p, false));
+    roomy.push_back(clearance_m(Segment2{p, p}, limit_m()) >= limit_m());
+  }
   for (Eigen::Index i = 0; i < n; ++i) {
     const Vector2d& from_m = points_m[static_cast<std::size_t>(i)];
     const std::vector<Link> starts = links(from_m, true);
@@ -259,6 +263,8 @@ Eigen::MatrixXd Roadmap::lengths_m(const std::vector<Vector2d>& points_m,
       const Vector2d& to_m = points_m[column];
       if (i == j) {
         lengths(i, j) = 0;
+      } else if (j < i && roomy[static_cast<std::size_t>(i)] && roomy[column]) {
+        lengths(i, j) = lengths(j, i);
       } else if (check_ends(from_m, to_m) != NoRoute::none) {
         continue;
       } else if (sees(from_m, to_m)) {

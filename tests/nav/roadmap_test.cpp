@@ -263,7 +263,7 @@ TEST(Roadmap, DijkstraAndAStarFindTheSameLengths) {
         ASSERT_EQ(route.has_value(), std::isfinite(lengths(i, j)));
         if (!route) continue;
         EXPECT_NEAR(route->length_m, lengths(i, j), 1e-6);
-        EXPECT_NEAR(lengths(j, i), lengths(i, j), 1e-6);
+        EXPECT_EQ(lengths(j, i), lengths(i, j));
         EXPECT_LE(smooth(i, j), lengths(i, j) + 1e-9);
         EXPECT_GE(smooth(i, j), (to - from).norm() - 1e-9);
       }
