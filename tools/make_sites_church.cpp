@@ -223,16 +223,16 @@ void add_ceilings(Model& model) {
 }
 
 constexpr const char* kAbout =
-    R"(The inside of a church of 49 x 22 m: a nave of 23 m with two aisles, a transept of 7 x 20 m, a choir, and a round
-apse with an ambulatory and five chapels. Everything is closed: what a scan cannot see inside, it cannot
-see at all.
+    R"(The inside of a church of 49 x 22 m: a nave of 23 m with two aisles, a transept of 7 x 20 m,
+a choir, and a round apse with an ambulatory and five chapels. Everything is closed: what a
+scan cannot see inside, it cannot see at all.
 
-- Columns of twelve sides (0.84 to 0.96 m thick, 18 of them) and four crossing piers of 1.5 m stand 3.7 m from the
-  axis; the gaps between them let a robot of 0.5 m radius through.
-- Nave and choir: barrel vault from 9.8 to 13.1 m with ribs. Aisles and ambulatory: 6.8 m with an arch at every
-  column. Transept: timber ceiling at 14 m with beams. Apse: half a dome.
-- The outer wall is one obstacle with a hole: its hole is the free space. Altar (1.1 m) and font (1 m) are
-  obstacles in the map and low in truth.
+- Columns of twelve sides (0.84 to 0.96 m thick, 18 of them) and four crossing piers of 1.5 m
+  stand 3.7 m from the axis; the gaps between them let a robot of 0.5 m radius through.
+- Nave and choir: barrel vault from 9.8 to 13.1 m with ribs. Aisles and ambulatory: 6.8 m with an
+  arch at every column. Transept: timber ceiling at 14 m with beams. Apse: half a dome.
+- The outer wall is one obstacle with a hole: its hole is the free space. Altar (1.1 m) and font
+  (1 m) are obstacles in the map and low in truth.
 )";
 
 }  // namespace

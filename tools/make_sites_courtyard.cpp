@@ -115,14 +115,15 @@ void map_obstacles(Site& site) {
 }
 
 constexpr const char* kAbout =
-    R"(Two parallel blocks of 101 m: the low one in front (16 m deep, 18 m high, top floor set back to 21 m), the high
-one behind (18 m deep, 47 m high). Between them a courtyard of 94 x 34 m, closed at the east by a building
-of 10 m and at the west by a wall of 3.6 m with a shut gate. 120 x 90 m in all.
+    R"(Two parallel blocks of 101 m: the low one in front (16 m deep, 18 m high, top floor set back
+to 21 m), the high one behind (18 m deep, 47 m high). Between them a courtyard of 94 x 34 m,
+closed at the east by a building of 10 m and at the west by a wall of 3.6 m with a shut
+gate. 120 x 90 m in all.
 
-- Six enclosed stairwells jut 3 to 6 m into the courtyard (two of them half-round) and rise to 21 to 49 m: they hide
-  the corners behind them from one another.
-- Balconies on the high block, a covered bridge across the courtyard at 7 to 11 m and the set-back top floor are
-  in no map; each hides walls above it from the ground.
+- Six enclosed stairwells jut 3 to 6 m into the courtyard (two of them half-round) and rise to 21
+  to 49 m: they hide the corners behind them from one another.
+- Balconies on the high block, a covered bridge across the courtyard at 7 to 11 m and the set-back
+  top floor are in no map; each hides walls above it from the ground.
 - The stairwells, walls and the link touch the blocks edge to edge in the map, as drawn plans do.
 - The robot works in the region `courtyard`; the world outside is drawn, not surveyed.
 )";

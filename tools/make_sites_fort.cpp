@@ -13,7 +13,7 @@ constexpr double kTerrepleinZ = 3.0;  // Walkway on the ramparts.
 constexpr double kParapetZ = 5.2;
 constexpr double kCrestZ = 1.0;       // Top of the counterscarp, where the glacis begins.
 constexpr double kBatter = 1.0 / 8;   // Horizontal per vertical metre of the scarp.
-constexpr double kMoatWidth = 18.0;   // Before the faces of the bastions.
+constexpr double kMoatWidth = 20.0;   // Before the faces of the bastions.
 constexpr double kCourt = 25.4;       // Half the side of the inner court.
 constexpr double kBarracks = 33.8;    // The barracks reach from kCourt to here.
 constexpr double kHalfLength = 21.5;  // Of a barracks building.
@@ -22,13 +22,13 @@ constexpr double kDivide = 29.8;   // The line through the barracks that parts i
 
 // Foot of the scarp, counter-clockwise: curtains, flanks and faces.
 Path scarp_foot() {
-  const Path east{{62.3, 36}, {74, 37.5}, {84, 84}, {37.5, 74}, {36, 62.3}};
+  const Path east{{60.3, 36}, {70.3, 37.2}, {78.3, 78.3}, {37.2, 70.3}, {36, 60.3}};
   return joined({east, placed(east, 90), placed(east, 180), placed(east, 270)});
 }
 
 // Foot of the counterscarp: parallel to the faces, round at the tips, re-entrant at the curtains.
 Path counterscarp_foot() {
-  const Vector2d tip(84, 84), shoulder(74, 37.5);
+  const Vector2d tip(78.3, 78.3), shoulder(70.3, 37.2);
   const Vector2d along = (tip - shoulder).normalized();
   const Vector2d outward(along.y(), -along.x());
   const Vector2d on_line = tip + kMoatWidth * outward;
@@ -68,8 +68,8 @@ void add_earthworks(Model& model) {
 void add_sentry_boxes(Model& model) {
   for (int i = 0; i < 4; ++i) {
     const Part box(model, "sentry_boxes", turned(90 * i));
-    box.column({80.4, 80.4}, 1.1, 6, kTerrepleinZ, 7.4);
-    box.cone({80.4, 80.4}, 1.3, 6, 7.4, 8.9);
+    box.column({74.9, 74.9}, 1.1, 6, kTerrepleinZ, 7.4);
+    box.cone({74.9, 74.9}, 1.3, 6, 7.4, 8.9);
   }
 }
 
@@ -91,17 +91,19 @@ void add_stairs(Model& model) {
 
 // A barracks building in its own frame: it lies north of the court.
 constexpr double kFrontDepth = 0.25;  // The fronts with their windows stand before the core.
+constexpr double kPorch = 3.4;        // How far the porches reach into the court.
 constexpr double kPassage = 2.0;      // Half the width of the gate passage.
 
 Path porch(double x) {
-  return rectangle(x - 2.6, kCourt - 2.6, x + 2.6, kCourt + 0.3);
+  return rectangle(x - 2.6, kCourt - kPorch, x + 2.6, kCourt + 0.3);
 }
 
 void add_porch(const Part& part, double x) {
   part.prism({porch(x), {}}, 0, 1.2);
-  for (const double side : {-2.2, 2.2}) part.column({x + side, kCourt - 2.2}, 0.28, 12, 1.2, 4.3);
-  part.box(x - 2.8, kCourt - 2.8, x + 2.8, kCourt + 0.3, 4.3, 4.7);
-  part.gable_y(x - 2.8, kCourt - 2.8, x + 2.8, kCourt + 0.3, 4.7, 6.1);
+  for (const double side : {-2.2, 2.2})
+    part.column({x + side, kCourt - kPorch + 0.4}, 0.28, 12, 1.2, 4.3);
+  part.box(x - 2.8, kCourt - kPorch - 0.2, x + 2.8, kCourt + 0.3, 4.3, 4.7);
+  part.gable_y(x - 2.8, kCourt - kPorch - 0.2, x + 2.8, kCourt + 0.3, 4.7, 6.1);
 }
 
 void add_annex(const Part& part) {
@@ -170,7 +172,10 @@ Path flagstaff() {
   return regular({4.3, -3.2}, 1.3, 8, 22.5);
 }
 Path well() {
-  return regular({-9.1, 7.4}, 1.2, 12);
+  return regular({-9.1, -8.4}, 1.2, 12);
+}
+Path kitchen() {
+  return rectangle(-13.2, 5.6, -6.4, 10.8);
 }
 Path guardhouse() {
   return rectangle(38.6, -46.6, 46.8, -40.4);
@@ -187,6 +192,8 @@ void add_yard(Model& model) {
   Part(model, "flagstaff").prism({flagstaff(), {}}, 0, 1.0);
   Part(model, "flagstaff").column({4.3, -3.2}, 0.15, 8, 1.0, 22);
   Part(model, "well").prism({well(), {}}, 0, 0.9);
+  Part(model, "kitchen").prism({kitchen(), {}}, 0, 2.8);
+  Part(model, "kitchen").gable_x(-13.5, 5.3, -6.1, 11.1, 2.8, 4.6);
   Part(model, "guardhouse").prism({guardhouse(), {}}, 0, 3.6);
   Part(model, "guardhouse").gable_x(38.3, -46.9, 47.1, -40.1, 3.6, 5.6);
   Part(model, "cistern").prism({cistern(), {}}, 0, 2.4);
@@ -201,12 +208,12 @@ void add_powder_magazine(Model& model) {
 }
 
 Path bridge_pier() {
-  return rectangle(-2.6, -73.1, 2.6, -71.3);
+  return rectangle(-2.6, -72.6, 2.6, -70.8);
 }
 
 // A stone bridge of two arches from the counterscarp to the gate in the south curtain.
 void add_bridge_and_gate(Model& model) {
-  const double y0 = -counterscarp_foot().front().x() - 0.4, y1 = -61.4;  // The moat is symmetric.
+  const double y0 = -counterscarp_foot().front().x() - 0.4, y1 = -59.4;  // The moat is symmetric.
   const auto s = [&](double y) { return y - y0; };
   Path side{{0, -1.5}};
   const auto opening = [&](double from, double to) {
@@ -216,10 +223,10 @@ void add_bridge_and_gate(Model& model) {
       side.emplace_back(middle - half * std::cos(t), -1.5 + 1.7 * std::sin(t));
     }
   };
-  opening(y0 + 0.8, -73.1);
-  side.emplace_back(s(-73.1), kMoatZ);
-  side.emplace_back(s(-71.3), kMoatZ);
-  opening(-71.3, -62.6);
+  opening(y0 + 0.8, -72.6);
+  side.emplace_back(s(-72.6), kMoatZ);
+  side.emplace_back(s(-70.8), kMoatZ);
+  opening(-70.8, -60.6);
   for (const Vector2d& corner : {Vector2d(s(y1), -1.5), Vector2d(s(y1), 1.0), Vector2d(0, 1.0)}) {
     side.push_back(corner);
   }
@@ -228,24 +235,24 @@ void add_bridge_and_gate(Model& model) {
   for (const double x : {-2.6, 2.3}) bridge.box(x, y0, x + 0.3, y1, 1.0, 2.0);
 
   const Part gate(model, "gatehouse");
-  gate.box(-5.2, -61.2, 5.2, -53.2, kTerrepleinZ, 9.0);
-  gate.gable_y(-5.6, -61.3, 5.6, -52.9, 9.0, 11.6);
+  gate.box(-5.2, -59.2, 5.2, -53.2, kTerrepleinZ, 9.0);
+  gate.gable_y(-5.6, -59.3, 5.6, -52.9, 9.0, 11.6);
 }
 
 // ---- The map ------------------------------------------------------------------------------------
 
 Path barracks_outline(bool annexed) {
-  const Path front{{-kHalfLength, kCourt}, {-13.6, kCourt},         {-13.6, kCourt - 2.6},
-                   {-8.4, kCourt - 2.6},   {-8.4, kCourt},          {8.4, kCourt},
-                   {8.4, kCourt - 2.6},    {13.6, kCourt - 2.6},    {13.6, kCourt},
-                   {kHalfLength, kCourt},  {kHalfLength, kBarracks}};
+  const Path front{{-kHalfLength, kCourt},  {-13.6, kCourt},         {-13.6, kCourt - kPorch},
+                   {-8.4, kCourt - kPorch}, {-8.4, kCourt},          {8.4, kCourt},
+                   {8.4, kCourt - kPorch},  {13.6, kCourt - kPorch}, {13.6, kCourt},
+                   {kHalfLength, kCourt},   {kHalfLength, kBarracks}};
   const Path back{{3, kBarracks}, {3, kBarracks + 3}, {-3, kBarracks + 3}, {-3, kBarracks}};
   return joined({front, annexed ? back : Path{}, {{-kHalfLength, kBarracks}}});
 }
 
 Path barracks_half() {
-  return {{kPassage, kCourt},       {8.4, kCourt},        {8.4, kCourt - 2.6},
-          {13.6, kCourt - 2.6},     {13.6, kCourt},       {kHalfLength, kCourt},
+  return {{kPassage, kCourt},       {8.4, kCourt},        {8.4, kCourt - kPorch},
+          {13.6, kCourt - kPorch},  {13.6, kCourt},       {kHalfLength, kCourt},
           {kHalfLength, kBarracks}, {kPassage, kBarracks}};
 }
 
@@ -278,6 +285,7 @@ void map_obstacles(Site& site) {
   site.obstacle("barrier", barrier());
   site.obstacle("flagstaff", flagstaff());
   site.obstacle("well", well());
+  site.obstacle("kitchen", kitchen());
   site.obstacle("guardhouse", guardhouse());
   site.obstacle("cistern", cistern());
   site.obstacle("bridge pier", bridge_pier());
@@ -295,20 +303,21 @@ void map_regions(Site& site) {
 }
 
 constexpr const char* kAbout =
-    R"(A square fort with four bastions: barracks round an inner court, an outer court between barracks and
-rampart, a dry moat, a glacis. 300 x 300 m in all, nothing above 22 m.
+    R"(A square fort with four bastions: barracks round an inner court, an outer court between
+barracks and rampart, a dry moat, a glacis. 300 x 300 m in all, nothing above 22 m.
 
-- Three regions that no robot can change between: `inner` (51 x 51 m, ground 0 m), `outer` (105 x 105 m
-  round the barracks, 0 m) and `moat` (floor -4 m; 18 m wide before the bastions, more before the
-  curtains). Walls of 3.4 m close the corners of the inner court; a barrier of 1.1 m, which the scanner
-  looks over, closes the passage under the west barracks.
-- Ramparts in steps that the map does not show: walkway at 3 m, firing step at 4 m, parapet at 5.2 m, scarp
-  leaning back 1 in 8; the counterscarp stands up to 1 m, and the glacis falls to 0 m.
+- Three regions that no robot can change between: `inner` (51 x 51 m, ground 0 m), `outer` (105 x
+  105 m round the barracks, 0 m) and `moat` (floor -4 m; 20 m wide before the bastions, more
+  before the curtains). Walls of 3.4 m close the corners of the inner court; a barrier of 1.1 m,
+  which the scanner looks over, closes the passage under the west barracks.
+- Ramparts in steps that the map does not show: walkway at 3 m, firing step at 4 m, parapet at 5.2
+  m, scarp leaning back 1 in 8; the counterscarp stands up to 1 m, and the glacis falls to 0 m.
 - `powder_magazine` (12 x 8 x 5 m, outer court, south) stands in the model and not in the map.
 - Porch roofs, eaves, the passage under the west barracks and the bridge hang over free ground.
-- Faults of drawn maps: the ring of `barracks south` is left open; `barracks east` repeats a vertex; the link
-  walls reach 5 cm into the barracks; the barrier reaches 3 cm, `stairs east` 4 cm into its neighbour;
-  the other stairs touch the rampart edge to edge; the glacis fills the map up to its boundary.
+- Faults of drawn maps: the ring of `barracks south` is left open; `barracks east` repeats a
+  vertex; the link walls reach 5 cm into the barracks; the barrier reaches 3 cm, `stairs east` 4
+  cm into its neighbour; the other stairs touch the rampart edge to edge; the glacis fills the map
+  up to its boundary.
 )";
 
 }  // namespace

@@ -191,15 +191,17 @@ void map_obstacles(Site& site) {
 }
 
 constexpr const char* kAbout =
-    R"(Curved and leaning volumes on 150 x 130 m, up to 41 m high. The map shows where the walls stand; the roofs
-above reach farther.
+    R"(Curved and leaning volumes on 150 x 130 m, up to 41 m high. The map shows where the walls
+stand; the roofs above reach farther.
 
-- `boat_gallery`, `fish_gallery` and `leaf_gallery` are swept along arcs; their roofs, like upturned boats, hang
-  over the walls by up to 3.2, 2.4 and 1.8 m and swell towards the middle.
-- `atrium` (41 m): petals that grow with the height, a waist, a brim. `bud` leans out by up to 3.3 m and
-  closes again. `bridge_tower` (36 m) and `north_tower` (27 m) taper and lean.
-- `canopy`: a bent plate at 15 to 17 m on one column. `offices` and `hall`: stone blocks with a cornice of 1 m.
-- Volumes run into one another: in the map the outlines overlap by metres, and repair makes one of them.
+- `boat_gallery`, `fish_gallery` and `leaf_gallery` are swept along arcs; their roofs, like
+  upturned boats, hang over the walls by up to 3.2, 2.4 and 1.8 m and swell towards the middle.
+- `atrium` (41 m): petals that grow with the height, a waist, a brim. `bud` leans out by up to 3.3
+  m and closes again. `bridge_tower` (36 m) and `north_tower` (27 m) taper and lean.
+- `canopy`: a bent plate at 15 to 17 m on one column. `offices` and `hall`: stone blocks with a
+  cornice of 1 m.
+- Volumes run into one another: in the map the outlines overlap by metres, and repair makes one of
+  them.
 )";
 
 }  // namespace

@@ -152,15 +152,16 @@ void map_targets(Site& site) {
 }
 
 constexpr const char* kAbout =
-    R"(A university hall of two parts: a base of 62 x 47 m, 11 m high, and on it, 22 m back from the front, a slab of
-37 x 11 m that rises to 52 m (56 m with its machine room). Around it eight campus buildings of 11 to 27 m
-on 230 x 230 m.
+    R"(A university hall of two parts: a base of 62 x 47 m, 11 m high, and on it, 22 m back from
+the front, a slab of 37 x 11 m that rises to 52 m (56 m with its machine room). Around it
+eight campus buildings of 11 to 27 m on 230 x 230 m.
 
-- From near, the base and its parapet hide the tower: the plan from the map alone stands near the corners and
-  misses much of the tower's front, which head-on views from farther off then fill in.
-- `target` lines say what counts for coverage: the outline of the hall and the fronts that face it. The
-  backs of the other buildings occlude, but do not count.
-- The boundary is a wall (3.2 m): it occludes. A flower bed is `keep_out`: nothing to see, not to be driven on.
+- From near, the base and its parapet hide the tower: the plan from the map alone stands near the
+  corners and misses much of the tower's front, which head-on views from farther off then fill in.
+- `target` lines say what counts for coverage: the outline of the hall and the fronts that face
+  it. The backs of the other buildings occlude, but do not count.
+- The boundary is a wall (3.2 m): it occludes. A flower bed is `keep_out`: nothing to see, not to
+  be driven on.
 - Canopy, cornice, pediment and eaves hang over free ground by 0.5 to 2 m.
 )";
 
