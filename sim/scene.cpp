@@ -143,6 +143,40 @@ std::optional<Hit> Scene::cast(const Eigen::Vector3d& W_from, const Eigen::Vecto
   return Hit{query.ray.tfar, query.hit.primID};
 }
 
+int Scene::first_clear(std::span<const Sight> W_segments, double near_m) const {
+  constexpr int kPacket = 16;
+  const auto count = static_cast<int>(W_segments.size());
+  if (count > kPacket) throw std::length_error("first_clear takes at most 16 segments");
+  if (count == 0) return -1;
+  RTCRay16 rays;
+  alignas(64) int valid[kPacket];
+  for (int i = 0; i < kPacket; ++i) {
+    valid[i] = i < count ? -1 : 0;
+    const Sight& sight = W_segments[i < count ? i : 0];
+    const Eigen::Vector3d way = sight.to - sight.from;
+    const double length_m = way.norm();
+    const RTCRay ray = make_ray(sight.from - W_origin_m_, way / length_m, near_m, length_m).ray;
+    rays.org_x[i] = ray.org_x;
+    rays.org_y[i] = ray.org_y;
+    rays.org_z[i] = ray.org_z;
+    rays.dir_x[i] = ray.dir_x;
+    rays.dir_y[i] = ray.dir_y;
+    rays.dir_z[i] = ray.dir_z;
+    rays.tnear[i] = ray.tnear;
+    rays.tfar[i] = ray.tfar;
+    rays.time[i] = 0;
+    rays.mask[i] = ~0u;
+    rays.id[i] = rays.flags[i] = 0;
+  }
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  rtcOccluded16(valid, scene_.get(), &context, &rays);
+  for (int i = 0; i < count; ++i)
+    if (!(rays.tfar[i] < 0)) return i;
+  return -1;
+}
+
 std::vector<double> Scene::heights_below(const Eigen::Vector3d& W_from, double depth_m) const {
   constexpr double kApart_m = 1e-3;  // Surfaces closer than this count once.
   std::vector<double> heights_m;

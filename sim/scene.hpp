@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "sim/mesh.hpp"
@@ -19,6 +20,10 @@ struct Hit {
   std::uint32_t triangle{};
 };
 
+struct Sight {
+  Eigen::Vector3d from, to;
+};
+
 // Answers do not depend on how many threads ask. Single precision inside, relative to the middle of
 // the mesh: 0.01 mm at a few hundred metres, wherever W has its origin.
 class Scene {
@@ -29,6 +34,10 @@ class Scene {
   // First surface from `W_from` along `W_direction` (unit) between near_m and far_m.
   std::optional<Hit> cast(const Eigen::Vector3d& W_from, const Eigen::Vector3d& W_direction,
                           double near_m, double far_m) const;
+
+  // The first of at most 16 segments that no surface crosses, near_m from its first end aside; -1
+  // when all are crossed. Throws std::length_error above 16.
+  int first_clear(std::span<const Sight> W_segments, double near_m) const;
 
   // Every surface straight below a point within depth_m: their heights in W, highest first.
   std::vector<double> heights_below(const Eigen::Vector3d& W_from, double depth_m) const;

@@ -18,7 +18,6 @@ enum Source : std::uint64_t {
   kGnssY
 };
 
-constexpr double kSlipLength_m = 0.5;
 constexpr double kStandstill_mps = 2e-3;  // Static friction: slower than this is not moving.
 constexpr double kGroundLook_m = 0.1;     // Between two looks at the ground under the rim.
 constexpr double kLookAhead_m = 1.0;
@@ -48,8 +47,8 @@ Eigen::Isometry3d StandingPose::T_W_S(double scanner_height_m) const {
 World::World(const Scene& scene, const WorldConfig& config)
     : scene_(scene),
       config_(config),
-      left_{0, 0, {config.seed, kSlipLeft, config.slip_sigma, kSlipLength_m}, 0, 0},
-      right_{0, 0, {config.seed, kSlipRight, config.slip_sigma, kSlipLength_m}, 0, 0},
+      left_{0, 0, {config.seed, kSlipLeft, config.slip_sigma, config.slip_length_m}, 0, 0},
+      right_{0, 0, {config.seed, kSlipRight, config.slip_sigma, config.slip_length_m}, 0, 0},
       gyro_(config.seed, kGyro),
       gyro_bias_radps_(NoiseStream(config.seed, kGyroBias).normal(config.gyro_bias_sigma_radps)),
       gnss_white_(config.seed, kGnssWhite),
@@ -60,20 +59,26 @@ World::World(const Scene& scene, const WorldConfig& config)
   robot_.ground_z_m = config.ground_z_m;
 }
 
-std::optional<double> World::ground_near(const Eigen::Vector2d& W_point, double z_m,
-                                         double reach_m) const {
-  const Eigen::Vector3d above(W_point.x(), W_point.y(), z_m + reach_m);
-  std::optional<double> nearest_m;
-  for (const double height_m : scene_.heights_below(above, 2 * reach_m))
-    if (!nearest_m || std::abs(height_m - z_m) < std::abs(*nearest_m - z_m)) nearest_m = height_m;
-  return nearest_m;
+// What wheels stand on: the highest surface that is a step up or down at most.
+std::optional<double> World::ground_within_step(const Eigen::Vector2d& W_point, double z_m) const {
+  const double step_m = config_.step_max_m;
+  const auto hit = scene_.cast({W_point.x(), W_point.y(), z_m + step_m}, -Eigen::Vector3d::UnitZ(),
+                               0, 2 * step_m);
+  return hit ? std::optional(z_m + step_m - hit->distance_m) : std::nullopt;
 }
 
 hal::Result<StandingPose> World::standing(const hal::Pose2& pose, double expected_ground_z_m,
                                           double radius_m) const {
   if (!pose.position_m.allFinite() || !std::isfinite(pose.heading_rad))
     return error(boost::system::errc::invalid_argument);
-  const auto ground_m = ground_near(pose.position_m, expected_ground_z_m, kGroundReach_m);
+  // The surface nearest to the expected height, not the roof of a shed; then what lies on it.
+  const Eigen::Vector3d above(pose.position_m.x(), pose.position_m.y(),
+                              expected_ground_z_m + kGroundReach_m);
+  std::optional<double> base_m;
+  for (const double z_m : scene_.heights_below(above, 2 * kGroundReach_m))
+    if (!base_m || std::abs(z_m - expected_ground_z_m) < std::abs(*base_m - expected_ground_z_m))
+      base_m = z_m;
+  const auto ground_m = base_m ? ground_within_step(pose.position_m, *base_m) : std::nullopt;
   if (!ground_m) return error(boost::system::errc::address_not_available);
   const double clear_m = scene_.clearance_m(pose.position_m, *ground_m + config_.step_max_m,
                                             *ground_m + config_.collision_height_m, radius_m);
@@ -155,7 +160,7 @@ void World::move(double left_m, double right_m) {
   clear_m_ -= std::abs(chord_m);
   ground_checked_m_ += std::abs(chord_m);
   if (ground_checked_m_ >= kGroundLook_m)
-    if (const auto ground_m = ground_near(to.pose.position_m, to.ground_z_m, config_.step_max_m))
+    if (const auto ground_m = ground_within_step(to.pose.position_m, to.ground_z_m))
       to.ground_z_m = *ground_m;
   if (chord_m != 0 && blocked(to)) {
     robot_.pose.heading_rad = to.pose.heading_rad;
@@ -186,14 +191,13 @@ bool World::blocked(const StandingPose& to) {
 
 // A moat's edge under the centre or the rim. A slope within the step over the radius is ground.
 bool World::ground_breaks_off(const StandingPose& at) const {
-  const double reach_m = config_.step_max_m;
-  if (!ground_near(at.pose.position_m, at.ground_z_m, reach_m)) return true;
+  if (!ground_within_step(at.pose.position_m, at.ground_z_m)) return true;
   for (int i = 0; i < kRimPoints; ++i) {
     const double angle_rad = 2 * std::numbers::pi * i / kRimPoints;
     const Eigen::Vector2d rim =
         at.pose.position_m +
         config_.radius_m * Eigen::Vector2d(std::cos(angle_rad), std::sin(angle_rad));
-    if (!ground_near(rim, at.ground_z_m, reach_m)) return true;
+    if (!ground_within_step(rim, at.ground_z_m)) return true;
   }
   return false;
 }

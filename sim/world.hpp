@@ -32,9 +32,10 @@ struct WorldConfig {
   double step_max_m = 0.15;       // Drives over lower steps; does not drive off higher ones.
   double collision_height_m = 1.5;
 
-  // The slip of each side wanders with this sigma over half a metre of its travel, so the travel
-  // error's variance grows by slip_sigma^2 m^2 per metre.
+  // The slip of each side wanders with this sigma over slip_length_m of its travel: over a longer
+  // way d the travel error's variance is 2 slip_sigma^2 slip_length_m d.
   double slip_sigma = 0.02;
+  double slip_length_m = 5.0;
   double encoder_tick_m = 0.001;
   double gyro_sigma_radps = 0.05 * 0.017453292519943295;
   double gyro_bias_sigma_radps = 0.02 * 0.017453292519943295;  // Drawn once per run.
@@ -133,8 +134,7 @@ class World {
   bool ground_breaks_off(const StandingPose& at) const;
   void stop_against_something();
   bool free_ahead(double forward_mps) const;
-  std::optional<double> ground_near(const Eigen::Vector2d& W_point, double z_m,
-                                    double reach_m) const;
+  std::optional<double> ground_within_step(const Eigen::Vector2d& W_point, double z_m) const;
 
   const Scene& scene_;
   const WorldConfig config_;
