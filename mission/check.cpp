@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <regex>
 
 #include "mission/suggest.hpp"
 
@@ -105,11 +106,18 @@ class SiteCheck {
 
 }  // namespace
 
+ConfigError site_error(const std::string& text, const std::string& file) {
+  static const std::regex pattern(R"(^([^:\n]+):([0-9]{1,9}):([0-9]{1,9}):? ([^]*)$)");
+  std::smatch match;
+  if (!std::regex_match(text, match, pattern)) return {file, 0, 0, text};
+  return {match[1], std::stoi(match[2]), std::stoi(match[3]), match[4]};
+}
+
 std::vector<ConfigError> check_site(const MissionConfig& config, const nav::RepairedSite& site,
                                     const std::vector<nav::FreeArea>& areas) {
   std::vector<ConfigError> errors;
   for (const auto& error : site.errors)
-    errors.push_back({config.site_folder.generic_string(), 0, 0, error});
+    errors.push_back(site_error(error, config.site_folder.generic_string()));
   if (!errors.empty()) return errors;  // A broken map says nothing more.
   return SiteCheck{config, site.map, areas}.run();
 }

@@ -177,14 +177,14 @@ void load_robot(Draft& draft, const fs::path& mission_file) {
   read_robot_text(draft, *text, path.generic_string());
 }
 
-// The folder itself; what is in it is read with the site.
+// Only that it is there (a folder, or a map file); what it holds is read with the site.
 void check_site_folder(Draft& draft, const fs::path& mission_file, const Overrides& overrides) {
   auto& folder = draft.config().site_folder;
   std::error_code ignored;
   if (!overrides.site_folder.empty()) {
     folder = overrides.site_folder;
     draft.config().written["site"] = {"--site", 0, 0};
-    if (!fs::is_directory(folder, ignored))
+    if (!fs::exists(folder, ignored))
       draft.fail({"--site", 0, 0}, fmt::format("site folder '{}' does not exist{}",
                                                folder.generic_string(), guess_sibling(folder)));
     return;
@@ -196,7 +196,7 @@ void check_site_folder(Draft& draft, const fs::path& mission_file, const Overrid
     return;
   }
   folder = relative_to(mission_file, folder);
-  if (!fs::is_directory(folder, ignored))
+  if (!fs::exists(folder, ignored))
     draft.fail(place_of(draft, "site"),
                fmt::format("site folder '{}' does not exist (the path is relative to the mission "
                            "file){}",

@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <variant>
+
+#include "mission/toml_scan.hpp"
 
 namespace mission {
 namespace {
 
 constexpr std::size_t kTextMax = 256 * 1024;
-constexpr int kErrorsMax = 20;
+constexpr std::size_t kErrorsMax = 20;
 constexpr int kDotsMax = 64;
 
 std::vector<std::string> split_lines(std::string_view text) {
@@ -72,7 +75,6 @@ constexpr Remedy kRemedies[]{
     {"expected a comment", "write one key = value on a line"},
     {"expected digit", "write a plain number: the unit is part of the key"},
     {"floating-point", "write digits on both sides of the point"},
-    {"utf-8", "save the file as UTF-8"},
 };
 
 // What the person can do about it.
@@ -131,6 +133,30 @@ int too_deep_line(const std::vector<std::string>& lines) {
   return 0;
 }
 
+// One attempt: a table, or the first error.
+std::variant<toml::table, TomlError> parse(const std::vector<std::string>& lines) {
+  try {
+    return toml::parse(std::string_view{join(lines)});
+  } catch (const toml::parse_error& error) {
+    return explain(error, lines);
+  } catch (const TomlAssertion&) {
+    return TomlError{};
+  }
+}
+
+// Where the parser gave up without saying: the end of the shortest beginning that it cannot bear.
+TomlError unexplained(const std::vector<std::string>& lines) {
+  for (std::size_t n = 1; n <= lines.size(); ++n) {
+    const std::vector<std::string> begin(lines.begin(), lines.begin() + static_cast<long>(n));
+    const auto parsed = parse(begin);
+    const auto* error = std::get_if<TomlError>(&parsed);
+    if (error && error->line == 0)
+      return {static_cast<int>(n), static_cast<int>(indent(lines[n - 1])) + 1,
+              "not TOML: something in this line cannot be read; correct or remove it"};
+  }
+  return {1, 1, "not TOML: something cannot be read"};
+}
+
 }  // namespace
 
 TomlText parse_toml(std::string_view text) {
@@ -144,13 +170,20 @@ TomlText parse_toml(std::string_view text) {
     result.errors.push_back({line, 1, fmt::format("more than {} dots in one line", kDotsMax)});
     return result;
   }
-  for (int tries = 0; tries < kErrorsMax; ++tries) {
-    auto parsed = toml::parse(std::string_view{join(lines)});
-    if (parsed) {
-      result.table = std::move(parsed).table();
+  for (const auto& place : strange_characters(lines)) {
+    auto& line = lines[static_cast<std::size_t>(place.line) - 1];
+    line.clear();
+    result.errors.push_back({place.line, place.column, place.message});
+    if (result.errors.size() >= kErrorsMax) return result;
+  }
+  for (std::size_t tries = 0; tries < kErrorsMax; ++tries) {
+    auto parsed = parse(lines);
+    if (auto* table = std::get_if<toml::table>(&parsed)) {
+      result.table = std::move(*table);
       return result;
     }
-    const auto error = explain(parsed.error(), lines);
+    auto error = std::get<TomlError>(parsed);
+    if (error.line == 0) error = unexplained(lines);
     const bool go_on = leave_out(lines, error);
     if (go_on || result.errors.empty()) result.errors.push_back(error);
     if (!go_on) return result;

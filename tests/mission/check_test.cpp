@@ -36,7 +36,7 @@ mission::MissionConfig config_of(std::string_view text) {
 
 std::vector<std::string> check(const mission::MissionConfig& config,
                                const nav::RepairedSite& site) {
-  const auto areas = nav::free_areas(site.map, config.robot.body.radius_m, mission::kAreaMinM2);
+  const auto areas = nav::free_areas(site.map, config.robot.body.radius_m, mission::kFreeAreaMinM2);
   std::vector<std::string> texts;
   for (const auto& error : mission::check_site(config, site, areas)) texts.push_back(error.text());
   return texts;
@@ -87,7 +87,7 @@ TEST(CheckSite, RefusesMoreThan400MillionVoxelsAndSaysWhatWouldDo) {
   const auto texts = check(config_of("[phase2]\nvoxel_m = 0.05\n"), yard());
   ASSERT_EQ(texts.size(), 1u);
   EXPECT_EQ(texts[0],
-            "m.toml:2:1: the site's box of 100 x 100 x 30 m has 2408 million voxels of 0.05 m, "
+            "m.toml:2:1: the site's box of 100 x 100 x 30 m has 2409 million voxels of 0.05 m, "
             "more than 400 million; write voxel_m = 0.10 or more, or make 'height_m' smaller");
   EXPECT_THAT(check(config_of("[phase2]\nvoxel_m = 0.10\n"), yard()), testing::IsEmpty());
 }
@@ -96,7 +96,16 @@ TEST(CheckSite, ABrokenMapIsToldAsItIs) {
   nav::RepairedSite site;
   site.errors = {"footprint.geojson:3:1 (feature 1): the outline crosses itself"};
   EXPECT_THAT(check(config_of("[regions]\nmoat = 'skip'\n"), site),
-              testing::ElementsAre("sites/yard: " + site.errors[0]));
+              testing::ElementsAre(site.errors[0]));
+}
+
+TEST(CheckSite, ASiteErrorKeepsItsPlaceAndGetsTheFolderWithoutOne) {
+  const auto placed = mission::site_error("s/footprint.geojson:12:5: feature 3: too small", "s");
+  EXPECT_EQ(placed.file, "s/footprint.geojson");
+  EXPECT_EQ(placed.line, 12);
+  EXPECT_EQ(placed.column, 5);
+  EXPECT_EQ(placed.message, "feature 3: too small");
+  EXPECT_EQ(mission::site_error("no boundary: draw one", "s").text(), "s: no boundary: draw one");
 }
 
 }  // namespace

@@ -1,0 +1,72 @@
+// vantage: the person's command line, without the robot.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <optional>
+
+#include "mission/check_report.hpp"
+#include "mission/config_schema.hpp"
+#include "mission/json_text.hpp"
+
+namespace {
+
+constexpr int kFine = 0, kRefused = 2;
+
+struct CheckOptions {
+  std::filesystem::path mission;
+  std::filesystem::path site;
+  std::optional<std::uint64_t> seed;
+  bool json = false;
+};
+
+int check(const CheckOptions& options) {
+  const auto result = mission::check_mission(options.mission, {.site_folder = options.site,
+                                                               .has_seed = options.seed.has_value(),
+                                                               .seed = options.seed.value_or(0)});
+  if (options.json) fmt::print("{}", mission::json_pretty(mission::check_json(result)));
+  for (const auto& error : result.errors)
+    if (!options.json) fmt::print(stderr, "{}\n", error.text());
+  if (!result.errors.empty()) return kRefused;
+  if (!options.json) fmt::print("{}", mission::check_text(result));
+  return kFine;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"Helps to write missions: checks them, explains their keys."};
+  app.footer(
+      "Examples:\n"
+      "  vantage check configs/missions/fort.toml\n"
+      "  vantage check configs/missions/any_site.toml --site path/to/folder --json\n"
+      "  vantage keys | less\n"
+      "Exit: 0 fine, 2 not fine (every reason is on stderr, one a line).");
+  app.require_subcommand(1);
+
+  CheckOptions options;
+  auto* check_command = app.add_subcommand(
+      "check",
+      "Reads a mission, its robot and its site; reports every error, or what will be used");
+  check_command->add_option("mission", options.mission, "Mission file (TOML)")->required();
+  check_command->add_option("--site", options.site,
+                            "Use this site folder instead of the mission's");
+  check_command->add_option("--seed", options.seed, "Use this seed instead of the mission's");
+  check_command->add_flag("--json", options.json, "Report as JSON on stdout, errors too");
+  auto* keys_command =
+      app.add_subcommand("keys", "Prints every key with its range, default and meaning (Markdown)");
+
+  try {
+    app.parse(argc, argv);
+    if (*keys_command) {
+      fmt::print("{}", mission::config_reference());
+      return kFine;
+    }
+    return check(options);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kFine : kRefused;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "vantage: {}\n", error.what());
+    return kRefused;
+  }
+}
