@@ -140,11 +140,13 @@ hal::Task<void> Survey::tour(std::size_t t) {
   const AreaPlan& plan = record_.plans[t];
   for (const int s : plan.tour) {
     const planning::Station& station = plan.cover.stations[static_cast<std::size_t>(s)];
-    co_await visit({.name = station_name(plan, s),
+    // Named: GCC 12 destroys an aggregate made inside a co_await expression twice.
+    const Stop stop{.name = station_name(plan, s),
                     .task = static_cast<int>(t),
                     .pose = pose_of(station.at),
                     .station = &station,
-                    .view = nullptr});
+                    .view = nullptr};
+    co_await visit(stop);
     ++stations_done_;
     covered_m_ += station.adds_m;
   }
@@ -166,11 +168,12 @@ hal::Task<void> Survey::refine() {
     bool done = false;
     for (std::size_t i = 0; i < views.size() && !done; ++i) {
       model_.exclude(views[i].cell.voxel);
-      done = co_await visit({.name = fmt::format("NBV {}", taken + 1),
-                             .task = views[i].cell.task,
-                             .pose = views[i].pose,
-                             .station = nullptr,
-                             .view = &views[i]});
+      const Stop stop{.name = fmt::format("NBV {}", taken + 1),
+                      .task = views[i].cell.task,
+                      .pose = views[i].pose,
+                      .station = nullptr,
+                      .view = &views[i]};
+      done = co_await visit(stop);
     }
     if (!done) {
       record_.end = "none of the views that would add enough can be reached";
