@@ -315,9 +315,9 @@ barracks and rampart, a dry moat, a glacis. 300 x 300 m in all, nothing above 22
 - `powder_magazine` (12 x 8 x 5 m, outer court, south) stands in the model and not in the map.
 - Porch roofs, eaves, the passage under the west barracks and the bridge hang over free ground.
 - Faults of drawn maps: the ring of `barracks south` is left open; `barracks east` repeats a
-  vertex; the link walls reach 5 cm into the barracks; the barrier reaches 3 cm, `stairs east` 4
-  cm into its neighbour; the other stairs touch the rampart edge to edge; the glacis fills the map
-  up to its boundary.
+  vertex; the southern half of `barracks west` runs clockwise; the link walls reach 5 cm into the
+  barracks; the barrier reaches 3 cm, `stairs east` 4 cm into its neighbour; the other stairs
+  touch the rampart edge to edge; the glacis fills the map up to its boundary.
 )";
 
 }  // namespace

@@ -112,7 +112,7 @@ void add_atrium(Model& model) {
 }
 
 // Walls that lean out from 1 m above the ground, then close in: a flower bud.
-const Blob kBud{{-12.5, -15.5}, 10.2, 8.4, 3, 0.08, 50, 25};
+const Blob kBud{{-10.2, -14.0}, 10.2, 8.4, 3, 0.08, 50, 25};
 
 void add_bud(Model& model) {
   const auto at = [](double factor) { return Shape{outline(scaled(kBud, factor), 32), {}}; };

@@ -30,7 +30,8 @@ std::string geometry(const Feature& feature) {
   }
   std::string rings;
   for (const Path& ring : feature.rings) {
-    rings += (rings.empty() ? "" : ", ") + positions(ring, !feature.left_open);
+    const bool hole = !rings.empty();  // Holes are authored like outlines and written clockwise.
+    rings += (hole ? ", " : "") + positions(hole ? reversed(ring) : ring, !feature.left_open);
   }
   return R"({"type": "Polygon", "coordinates": [)" + rings + "]}";
 }

@@ -41,6 +41,10 @@ struct Expected {
   Vector3d low, high;  // Bounding box of the model.
 };
 
+void PrintTo(const Expected& expected, std::ostream* out) {
+  *out << expected.name;
+}
+
 class EverySite : public testing::TestWithParam<Expected> {
  protected:
   const Site site_ = load(GetParam().name);
