@@ -196,7 +196,7 @@ void Sweep::cast(const Rays& rays, Live& live) const {
       i += cells;
       level = std::min(level + 1, BlockedRows::kLevels - 1);
     } else if (level > 0) {
-      level = level / 2;
+      level /= 4;
     } else {
       shade<kSide>(rays, i, live);
       ++i;
