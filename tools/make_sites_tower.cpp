@@ -162,7 +162,8 @@ eight campus buildings of 11 to 27 m on 230 x 230 m.
   it. The backs of the other buildings occlude, but do not count.
 - The boundary is a wall (3.2 m): it occludes. A flower bed is `keep_out`: nothing to see, not to
   be driven on.
-- Canopy, cornice, pediment and eaves hang over free ground by 0.5 to 2 m.
+- Canopy, cornice and eaves hang over free ground by 0.5 to 2 m; the library has a portico of 5 m
+  on six columns.
 )";
 
 }  // namespace

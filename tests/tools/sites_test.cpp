@@ -308,13 +308,13 @@ TEST(Museum, HasRoofsThatReachOneToFourMetresBeyondItsWalls) {
   const Site museum = load("museum");
   const Columns columns(museum.model);
   const nav::Polygons within_1 = nav::offset(museum.map.obstacles, 1000);
-  const nav::Polygons within_5 = nav::offset(museum.map.obstacles, 5000);
+  const nav::Polygons within_4 = nav::offset(museum.map.obstacles, 4100);
   int covered_beyond_1 = 0;
   for (const Vector3d& p : free_points(museum.map, 20000)) {
     if (std::isinf(columns.above(p + Vector3d(0, 0, 0.5)).first_z)) continue;
     const nav::PointMm mm = nav::to_mm(p.head<2>());
     covered_beyond_1 += !nav::contains(within_1, mm);
-    EXPECT_TRUE(nav::contains(within_5, mm)) << p.transpose();
+    EXPECT_TRUE(nav::contains(within_4, mm)) << p.transpose();
   }
   EXPECT_GT(covered_beyond_1, 50);
 }
