@@ -158,8 +158,6 @@ std::string gains_chart(const RunRecord& run) {
   const double limit = chart.y(run.gain_min_voxels);
   chart.add(fmt::format("<line x1=\"{}\" y1=\"{:.1f}\" x2=\"{}\" y2=\"{:.1f}\" class=\"limit\"/>\n",
                         kLeft, limit, kWidth - kRight, limit));
-  chart.text(kLeft + 4, limit - 4, "tick", "start",
-             "stop below " + count_text(static_cast<std::uint64_t>(run.gain_min_voxels)));
   chart.line(gains, "c-line");
   for (std::size_t i = 0; i < run.scans.size(); ++i) {
     const ScanRecord& scan = run.scans[i];
@@ -180,13 +178,13 @@ std::string voxel_curves(const RunRecord& run) {
   if (run.scans.empty()) return "";
   constexpr std::string_view kKey =
       "<ul class=\"legend\"><li><svg viewBox=\"0 0 30 18\"><line x1=\"2\" y1=\"9\" x2=\"28\" "
-      "y2=\"9\" class=\"c-line\"/><circle cx=\"15\" cy=\"9\" r=\"3.4\" "
-      "class=\"c-dot\"/></svg>newly "
-      "seen-occupied</li><li><svg viewBox=\"0 0 30 18\"><circle cx=\"15\" cy=\"9\" r=\"4\" "
-      "class=\"v-ring\"/></svg>predicted for the NBV</li><li><svg viewBox=\"0 0 30 18\"><circle "
-      "cx=\"15\" cy=\"9\" r=\"4\" class=\"v-dot\"/></svg>resolved by it</li><li><svg viewBox=\"0 0 "
-      "30 18\"><rect x=\"3\" y=\"2\" width=\"24\" height=\"14\" class=\"v-zone\"/></svg>Phase "
-      "II</li></ul>\n";
+      "y2=\"9\" class=\"c-line\"/><circle cx=\"15\" cy=\"9\" r=\"3.4\" class=\"c-dot\"/>"
+      "</svg>newly seen-occupied</li><li><svg viewBox=\"0 0 30 18\"><circle cx=\"15\" cy=\"9\" "
+      "r=\"4\" class=\"v-ring\"/></svg>predicted for the NBV</li><li><svg viewBox=\"0 0 30 18\">"
+      "<circle cx=\"15\" cy=\"9\" r=\"4\" class=\"v-dot\"/></svg>resolved by it</li><li><svg "
+      "viewBox=\"0 0 30 18\"><rect x=\"3\" y=\"2\" width=\"24\" height=\"14\" class=\"v-zone\"/>"
+      "</svg>Phase II</li><li><svg viewBox=\"0 0 30 18\"><line x1=\"2\" y1=\"9\" x2=\"28\" "
+      "y2=\"9\" class=\"limit\"/></svg>least worth a view</li></ul>\n";
   return totals_chart(run) + gains_chart(run) + std::string(kKey);
 }
 
