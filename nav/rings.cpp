@@ -72,6 +72,7 @@ struct Edge {
 // That ends, because every crossing cuts at least one of its edges into shorter ones.
 bool cut_at_contacts(std::vector<Edge>& edges) {
   std::vector<SegmentMm> lines;
+  lines.reserve(edges.size());
   for (const Edge& e : edges) lines.push_back(e.line);
   const std::vector<Contact> found = contacts(lines);
   if (found.empty()) return false;
