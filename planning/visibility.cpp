@@ -142,6 +142,18 @@ struct Chain {
 constexpr Excluded kExcludedBy[Chain::kLength] = {Excluded::range_max, Excluded::range_min,
                                                   Excluded::grazing, Excluded::field_of_view};
 
+// Calls see() with what all constraints from the k-th on admit of the piece, in order.
+template <class See>
+void clip(const WallPiece& piece, const Chain& chain, int k, const See& see) {
+  if (k == Chain::kLength) return see(piece);
+  for (int i = 0; i < chain.by[k].count; ++i) {
+    const Interval& part = chain.by[k].parts[i];
+    const WallPiece kept{piece.wall, std::max(piece.from_m, part.from_m),
+                         std::min(piece.to_m, part.to_m)};
+    if (kept.from_m < kept.to_m) clip(kept, chain, k + 1, see);
+  }
+}
+
 void check(const SensorLimits& limits) {
   const auto refuse = [](const std::string& what) { throw std::invalid_argument(what); };
   if (!(limits.range_min_m >= 0 && limits.range_min_m < limits.range_max_m))
@@ -155,17 +167,6 @@ void check(const SensorLimits& limits) {
 const SensorLimits& checked(const SensorLimits& limits) {
   check(limits);
   return limits;
-}
-
-// The pieces of one wall after another, as ranges of a list in order of walls.
-template <class Piece, class Visit>
-void for_each_wall(const std::vector<Piece>& pieces, const Visit& visit) {
-  for (auto begin = pieces.begin(); begin != pieces.end();) {
-    const auto end =
-        std::find_if(begin, pieces.end(), [&](const Piece& p) { return p.wall != begin->wall; });
-    visit(begin, end);
-    begin = end;
-  }
 }
 
 }  // namespace
@@ -200,15 +201,15 @@ std::vector<WallPiece> Visibility::from(const Candidate& viewpoint) const {
   // 1 mm more than needed, so that rounding cannot matter.
   const auto in_sight = sight_.from(viewpoint.position, limits_.range_max_m * 1000 + 1);
   Pieces seen;
-  for_each_wall(in_sight, [&](auto begin, auto end) {
-    const Wall& wall = walls_[static_cast<std::size_t>(begin->wall)];
-    const Chain chain(wall, viewpoint, limits_, grazing_tan_);
-    Pieces pieces;
-    for (auto piece = begin; piece != end; ++piece) pieces.push_back(in_m(*piece, walls_));
-    for (const Admitted& by : chain.by) pieces = admitted(pieces, by);
-    for (const WallPiece& piece : pieces)
+  std::optional<Chain> chain;  // Of the wall of the last piece.
+  for (std::size_t i = 0; i < in_sight.size(); ++i) {
+    const int wall = in_sight[i].wall;
+    if (i == 0 || wall != in_sight[i - 1].wall)
+      chain.emplace(walls_[static_cast<std::size_t>(wall)], viewpoint, limits_, grazing_tan_);
+    clip(in_m(in_sight[i], walls_), *chain, 0, [&](const WallPiece& piece) {
       if (piece.to_m - piece.from_m >= kPieceMinM) seen.push_back(piece);
-  });
+    });
+  }
   return seen;
 }
 

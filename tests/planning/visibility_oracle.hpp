@@ -167,33 +167,38 @@ inline std::vector<WallPiece> sight_by_cells(PointMm v, const std::vector<Wall>&
   return pieces;
 }
 
-// Whether a scanner images the point: literally what paper 3.1.1 asks, in floating point. For
-// points on `wall` that are not within a hair of any limit.
-inline bool images(const planning::Candidate& from, int wall, const Eigen::Vector2d& point_m,
-                   const std::vector<Wall>& walls, const planning::SensorLimits& limits) {
+// Which constraint keeps a scanner from imaging the point, if any: literally what paper 3.1.1 asks,
+// in floating point. For points on `wall` that are not within a hair of any limit.
+inline std::optional<planning::Excluded> excluded_by(const planning::Candidate& from, int wall,
+                                                     const Eigen::Vector2d& point_m,
+                                                     const std::vector<Wall>& walls,
+                                                     const planning::SensorLimits& limits) {
+  using planning::Excluded;
   const auto degrees = [](double rad) { return rad * 180 / M_PI; };
+  const auto cross = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+    return a.x() * b.y() - a.y() * b.x();
+  };
   const Eigen::Vector2d v_m = nav::to_m(from.position);
   const Wall& own = walls[static_cast<std::size_t>(wall)];
   const Eigen::Vector2d along = (nav::to_m(own.b) - nav::to_m(own.a)).normalized();
   const Eigen::Vector2d normal(along.y(), -along.x());  // To the free side.
   const Eigen::Vector2d beam = point_m - v_m;
-  const double range_m = beam.norm();
-  if (-beam.dot(normal) <= 0) return false;
-  if (range_m > limits.range_max_m || range_m < limits.range_min_m) return false;
-  if (degrees(std::acos(-beam.dot(normal) / range_m)) > limits.grazing_max_deg) return false;
-  const double off = std::remainder(std::atan2(beam.y(), beam.x()) - from.heading_rad, 2 * M_PI);
-  if (std::abs(degrees(off)) > limits.fov_deg / 2) return false;
-  const auto cross = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-    return a.x() * b.y() - a.y() * b.x();
-  };
+  if (-beam.dot(normal) <= 0) return Excluded::occluded;
   for (std::size_t i = 0; i < walls.size(); ++i) {
     if (static_cast<int>(i) == wall) continue;
     const Eigen::Vector2d a = nav::to_m(walls[i].a) - v_m, b = nav::to_m(walls[i].b) - v_m;
     const bool astride = (cross(beam, a) > 0) != (cross(beam, b) > 0);
     const bool beyond = (cross(b - a, -a) > 0) != (cross(b - a, beam - a) > 0);
-    if (astride && beyond) return false;
+    if (astride && beyond) return Excluded::occluded;
   }
-  return true;
+  const double range_m = beam.norm();
+  if (range_m > limits.range_max_m) return Excluded::range_max;
+  if (range_m < limits.range_min_m) return Excluded::range_min;
+  if (degrees(std::acos(-beam.dot(normal) / range_m)) > limits.grazing_max_deg)
+    return Excluded::grazing;
+  const double off = std::remainder(std::atan2(beam.y(), beam.x()) - from.heading_rad, 2 * M_PI);
+  if (std::abs(degrees(off)) > limits.fov_deg / 2) return Excluded::field_of_view;
+  return std::nullopt;
 }
 
 }  // namespace oracle
