@@ -8,6 +8,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "sim/facets.hpp"
 #include "sim/parallel.hpp"
 #include "sim/position_tree.hpp"
 
@@ -28,50 +29,36 @@ struct Patch {
   AlignedBox3d box;
 };
 
-// A triangle that was found in the way. Shadows: crosses every segment between two convex sets,
-// which holds when it crosses every segment between their corners: for fixed a the crossing point
-// is a projective image of b, so it stays in the hull of the corners' images; likewise for a.
-class Blocker {
- public:
-  Blocker(const Scene& scene, std::uint32_t triangle) : corner_(scene.corners_m(triangle)) {
-    normal_ = (corner_[1] - corner_[0]).cross(corner_[2] - corner_[0]).normalized();
-    for (int i = 0; i < 3; ++i)
-      inward_[i] = normal_.cross(corner_[(i + 1) % 3] - corner_[i]).normalized();
+constexpr double kMargin_m = 1e-3;  // Of a facet: leaves its edges to Embree.
+
+bool crosses(const Facet& facet, const Vector3d& point) {
+  for (int i = 0; i < facet.count; ++i)
+    if (!(facet.inward[i].dot(point - facet.corners_m[i]) >= kMargin_m)) return false;
+  return true;
+}
+
+// Whether a facet crosses every segment between the patch and a position or a box. That holds when
+// it crosses every segment between their corners: for a fixed end the crossing point is a
+// projective image of the other end, so it stays in the hull of the corners' images.
+bool shadows(const Facet& facet, const Patch& patch, const Vector3d& position) {
+  const double beyond = facet.normal.dot(position - facet.corners_m[0]);
+  if (std::abs(beyond) < kMargin_m) return false;
+  const double side = beyond > 0 ? -1 : 1;  // The patch's.
+  for (const Vector3d& a : patch.corners) {
+    const double before = facet.normal.dot(a - facet.corners_m[0]);
+    if (side * before < 2 * kNudge_m) return false;
+    if (!crosses(facet, a + (position - a) * (before / (before - beyond)))) return false;
   }
+  return true;
+}
 
-  bool shadows(const Patch& patch, const AlignedBox3d& box) const {
-    for (int i = 0; i < 8; ++i)
-      if (!shadows(patch, Vector3d(box.corner(static_cast<AlignedBox3d::CornerType>(i)))))
-        return false;
-    return true;
-  }
-
-  bool shadows(const Patch& patch, const Vector3d& position) const {
-    const double beyond = height(position);
-    if (std::abs(beyond) < kMargin_m) return false;
-    const double side = beyond > 0 ? -1 : 1;  // The patch's.
-    for (const Vector3d& a : patch.corners) {
-      const double before = height(a);
-      if (side * before < 2 * kNudge_m) return false;
-      if (!holds(a + (position - a) * (before / (before - beyond)))) return false;
-    }
-    return true;
-  }
-
- private:
-  static constexpr double kMargin_m = 1e-3;  // Leaves the edges to Embree.
-
-  double height(const Vector3d& point) const { return normal_.dot(point - corner_[0]); }
-  bool holds(const Vector3d& point) const {
-    for (int i = 0; i < 3; ++i)
-      if (!(inward_[i].dot(point - corner_[i]) >= kMargin_m)) return false;
-    return true;
-  }
-
-  std::array<Vector3d, 3> corner_;
-  std::array<Vector3d, 3> inward_;
-  Vector3d normal_;
-};
+bool shadows(const Facet& facet, const Patch& patch, const AlignedBox3d& box) {
+  const int corners = box.min().z() == box.max().z() ? 4 : 8;  // The lower ones come first.
+  for (int i = 0; i < corners; ++i)
+    if (!shadows(facet, patch, Vector3d(box.corner(static_cast<AlignedBox3d::CornerType>(i)))))
+      return false;
+  return true;
+}
 
 struct Judge {
   const Mesh& mesh;
@@ -79,10 +66,11 @@ struct Judge {
   const TruthGrid& grid;
   const TruthLimits& limits;
   const PositionTree& positions;
+  const Facets& facets;
   std::span<const Vector3d> stations;
 };
 
-// Searches for one visible pair per voxel. Remembers what helped the voxel before: useful triangles
+// Searches for one visible pair per voxel. Remembers what helped the voxel before: useful facets
 // and the last position with a view, which change how fast an answer comes and never the answer.
 class Search {
  public:
@@ -218,7 +206,7 @@ class Search {
     return height_m > flat_m * std::tan(limit_rad) + kNudge_m;
   }
 
-  // One triangle stands between the whole patch and the whole box, or a position.
+  // One facet stands between the whole patch and the whole box, or a position.
   bool in_shadow(const Patch& patch, const AlignedBox3d& box) {
     return in_shadow(patch, box, box.center());
   }
@@ -229,7 +217,7 @@ class Search {
   template <class Place>
   bool in_shadow(const Patch& patch, const Place& place, const Vector3d& middle) {
     for (auto blocker = blockers_.begin(); blocker != blockers_.end(); ++blocker)
-      if (blocker->shadows(patch, place)) {
+      if (shadows(**blocker, patch, place)) {
         std::rotate(blockers_.begin(), blocker, blocker + 1);
         return true;
       }
@@ -239,10 +227,10 @@ class Search {
     if (length_m < 2 * kNudge_m) return false;
     const auto hit = judge_.scene.cast(from, way / length_m, kNudge_m, length_m);
     if (!hit) return false;
-    const Blocker blocker(judge_.scene, hit->triangle);
-    if (!blocker.shadows(patch, place)) return false;
+    const Facet& blocker = judge_.facets.all[judge_.facets.of_triangle[hit->triangle]];
+    if (!shadows(blocker, patch, place)) return false;
     if (blockers_.size() == kBlockersMax) blockers_.pop_back();
-    blockers_.insert(blockers_.begin(), blocker);
+    blockers_.insert(blockers_.begin(), &blocker);
     return true;
   }
 
@@ -252,7 +240,7 @@ class Search {
   const Judge& judge_;
   const double cos_grazing_, sin_low_, sin_high_;
   std::vector<Patch> patches_;
-  std::vector<Blocker> blockers_;
+  std::vector<const Facet*> blockers_;
   std::vector<Sight> sights_;
   std::optional<Vector3d> witness_;
 };
@@ -293,7 +281,9 @@ SurfaceTruth judge_surface(const Mesh& mesh, const Scene& scene, const TruthGrid
   const auto samples = sample_surface(mesh, grid);
   const auto voxels = surface_voxels(samples, grid, seen_occupied);
   const PositionTree positions(W_scanner_positions_m);
-  const Judge judge{mesh, scene, grid, limits, positions, W_scanner_positions_m.first(stations)};
+  const Facets facets = join_facets(mesh);
+  const Judge judge{
+      mesh, scene, grid, limits, positions, facets, W_scanner_positions_m.first(stations)};
   std::vector<char> visible(voxels.size());
   for_each_chunk((voxels.size() + kChunk - 1) / kChunk, threads, [&](std::size_t chunk) {
     Search search(judge);
