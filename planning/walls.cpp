@@ -30,23 +30,26 @@ Stretch shared(const SegmentMm& edge, const SegmentMm& border) {
   constexpr Stretch kNothing{0, 0};
   const Vector2d along = direction(edge);
   const Vector2d right(along.y(), -along.x());
-  const double turn = direction(border).dot(along);
-  if (turn >= 0) return kNothing;  // The ground lies on the obstacle's side.
-  const bool parallel = turn < -std::cos(3 * std::numbers::pi / 180);
-  const double reach_m = parallel ? nav::kTargetReachM : kRoundingM;
-
   const Vector2d first = nav::to_m(border.b) - nav::to_m(edge.a);  // Where it is first met.
-  const Vector2d last = nav::to_m(border.a) - nav::to_m(edge.a);
-  const double step_m = last.dot(along) - first.dot(along);
-  const double from_m = std::max(0.0, first.dot(along));
-  const double to_m = std::min(nav::length_m(edge.a, edge.b), last.dot(along));
-  if (!(from_m < to_m)) return kNothing;
-  for (const double at_m : {from_m, to_m}) {
-    const double share = (at_m - first.dot(along)) / step_m;
-    const double off_m = (first + share * (last - first)).dot(right);
-    if (off_m < -kRoundingM || off_m > reach_m) return kNothing;
+  const Vector2d step = nav::to_m(border.a) - nav::to_m(border.b);
+  const double start_m = first.dot(along), step_m = step.dot(along);
+  if (step_m <= 0) return kNothing;  // The ground lies on the obstacle's side.
+  Stretch s{std::max(0.0, start_m), std::min(nav::length_m(edge.a, edge.b), start_m + step_m)};
+
+  const double slope = step.dot(right) / step_m;
+  const auto off_m = [&](double at_m) { return first.dot(right) + slope * (at_m - start_m); };
+  const bool parallel = std::abs(slope) < std::tan(3 * std::numbers::pi / 180);
+  const double reach_m = parallel ? nav::kTargetReachM : kRoundingM;
+  if (parallel && slope != 0) {  // Ground drawn askew borders the wall as far as it is near.
+    const double near_m = start_m + (-kRoundingM - first.dot(right)) / slope;
+    const double far_m = start_m + (reach_m - first.dot(right)) / slope;
+    s = {std::max(s.from_m, std::min(near_m, far_m)), std::min(s.to_m, std::max(near_m, far_m))};
   }
-  return {from_m, to_m};
+  if (!(s.from_m < s.to_m)) return kNothing;
+  constexpr double kHair = 1e-6;
+  for (const double at_m : {s.from_m, s.to_m})
+    if (off_m(at_m) < -kRoundingM - kHair || off_m(at_m) > reach_m + kHair) return kNothing;
+  return s;
 }
 
 class Borders {

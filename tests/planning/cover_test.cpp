@@ -95,6 +95,24 @@ TEST(WallsOf, SlantedWallIsCutToTheMillimetre) {
   EXPECT_NEAR(sum_m, all_m, 0.01);
 }
 
+TEST(WallsOf, RegionThatLeavesTheWallAtAShallowAngleEndsWhereItLeaves) {
+  SiteMap map = site(box(0, 0, 20, 10), box(0, 0, 20, 2));
+  const Polygons yard{{{nav::to_mm({0, 2}), nav::to_mm({10, 2}), nav::to_mm({10.2, 2.036}),
+                        nav::to_mm({20, 3.8}), nav::to_mm({20, 10}), nav::to_mm({0, 10})},
+                       {}}};
+  map.regions = {{"yard", yard, 0}};
+  EXPECT_NEAR(target_m(walls_of(map, areas_of(map)[0])), 10, 0.002);
+}
+
+TEST(WallsOf, GroundDrawnAskewBordersTheWallAsFarAsItIsNear) {
+  SiteMap map = site(box(0, 0, 20, 10), box(0, 0, 20, 2));
+  const Polygons yard{
+      {{nav::to_mm({0, 2.01}), nav::to_mm({20, 2.21}), nav::to_mm({20, 10}), nav::to_mm({0, 10})},
+       {}}};
+  map.regions = {{"yard", yard, 0}};  // 5 cm off after 4 m.
+  EXPECT_NEAR(target_m(walls_of(map, areas_of(map)[0])), 4, 0.002);
+}
+
 TEST(WallsOf, ThinWallBetweenTwoAreasGivesEachItsOwnFace) {
   const SiteMap map = site(box(0, 0, 20, 10), box(9.98, 0, 10.02, 10));  // 4 cm thick.
   const auto areas = areas_of(map);

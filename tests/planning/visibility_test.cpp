@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <numeric>
+#include <tuple>
 
 #include "nav/polygons.hpp"
 #include "tests/planning/visibility_oracle.hpp"
@@ -187,6 +189,45 @@ TEST(Sight, CleanMapsHaveNoTangledWalls) {
     walls.push_back({walls[0].b, walls[0].a});
     EXPECT_EQ(Sight(walls).tangled().size(), 1u);
   }
+}
+
+// The e of least length with cross(d, e) == 1, for coprime d in the first quadrant.
+PointMm next_direction(PointMm d) {
+  std::int64_t r0 = d.x, r1 = d.y, s0 = 1, s1 = 0, t0 = 0, t1 = 1;
+  while (r1 != 0) {
+    const std::int64_t q = r0 / r1;
+    std::tie(r0, r1) = std::pair(r1, r0 - q * r1);
+    std::tie(s0, s1) = std::pair(s1, s0 - q * s1);
+    std::tie(t0, t1) = std::pair(t1, t0 - q * t1);
+  }
+  return {-t0, s0};
+}
+
+TEST(Sight, DirectionsLessThanARoundingErrorApartAreToldApart) {
+  Dice dice(6);
+  int pieces = 0;
+  for (int round = 0; round < 3000; ++round) {
+    PointMm d;
+    do {
+      d = random_point(dice, 80'000'000) + PointMm{1, 1};
+    } while (std::gcd(d.x, d.y) != 1);
+    const PointMm e = next_direction(d);
+    ASSERT_EQ(nav::cross(d, e), 1);
+    const PointMm ends[] = {d, d + e, d + e + e, d - e, d + d + e, d + d};
+    std::vector<Wall> walls;
+    for (int i = 0; i < 4; ++i) {
+      const PointMm at = ends[dice.below(6)];
+      const PointMm other =
+          dice.below(4) == 0 ? ends[dice.below(6)]
+                             : at + random_point(dice, 8'000'000) - PointMm{4'000'000, 4'000'000};
+      walls.push_back(dice.below(2) == 0 ? Wall{at, other} : Wall{other, at});
+    }
+    const auto fast = Visibility(walls, kNoLimits).in_sight({0, 0});
+    const auto slow = oracle::sight_by_shadows({0, 0}, walls);
+    ASSERT_TRUE(fast == slow) << text(walls, {0, 0}) << text(fast) << text(slow);
+    pieces += static_cast<int>(fast.size());
+  }
+  EXPECT_GT(pieces, 3000);
 }
 
 TEST(Sight, SharesAreRoundedCorrectlyHoweverTheyAreWritten) {
