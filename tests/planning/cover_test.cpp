@@ -97,7 +97,7 @@ TEST(WallsOf, SlantedWallIsCutToTheMillimetre) {
 
 TEST(WallsOf, RegionThatLeavesTheWallAtAShallowAngleEndsWhereItLeaves) {
   SiteMap map = site(box(0, 0, 20, 10), box(0, 0, 20, 2));
-  const Polygons yard{{{nav::to_mm({0, 2}), nav::to_mm({10, 2}), nav::to_mm({10.2, 2.036}),
+  const Polygons yard{{{nav::to_mm({0, 2}), nav::to_mm({10, 2}), nav::to_mm({10.2, 2.04}),
                         nav::to_mm({20, 3.8}), nav::to_mm({20, 10}), nav::to_mm({0, 10})},
                        {}}};
   map.regions = {{"yard", yard, 0}};
