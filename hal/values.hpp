@@ -22,8 +22,12 @@ struct RobotClock {};  // Tags time points, so a wall-clock time cannot be passe
 using Duration = std::chrono::nanoseconds;
 using Time = std::chrono::time_point<RobotClock, Duration>;
 
-inline double seconds(Duration span) { return std::chrono::duration<double>(span).count(); }
-inline double seconds(Time time) { return seconds(time.time_since_epoch()); }
+inline double seconds(Duration span) {
+  return std::chrono::duration<double>(span).count();
+}
+inline double seconds(Time time) {
+  return seconds(time.time_since_epoch());
+}
 inline Duration from_seconds(double span_s) {
   return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(span_s));
 }

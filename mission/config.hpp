@@ -29,7 +29,7 @@ struct ScannerConfig {
   double azimuth_step_deg = 0.2;
   double elevation_min_deg = -60.0;
   double elevation_max_deg = 90.0;
-  double elevation_step_deg = 0.1;
+  double elevation_step_deg = 0.05;
   double scan_s = 300.0;
 };
 

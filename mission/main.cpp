@@ -25,6 +25,7 @@ struct Options {
   std::filesystem::path mission;
   std::filesystem::path out;
   std::filesystem::path site;
+  std::filesystem::path judge_cells;
   std::optional<std::uint64_t> seed;
   int threads = 0;
   bool quiet = false;
@@ -163,7 +164,7 @@ int survey_site(Prepared& prepared, const Options& options, int threads) {
   if (!backend.run([&] { return ended; }))
     failure = "the mission waits for something that cannot come";
   progress.finish();
-  record.truth = backend.judge(record, survey.model(), prepared.tasks.tasks);
+  record.truth = backend.judge(record, survey.model(), prepared.tasks.tasks, options.judge_cells);
   save_products(store, survey);
   print_outcome(record, store,
                 std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count());
@@ -201,6 +202,8 @@ int main(int argc, char** argv) {
   app.add_option("--threads", options.threads,
                  "Threads for planning and ray casting (0: all cores)")
       ->check(CLI::Range(0, 256));
+  app.add_option("--judge-cells", options.judge_cells,
+                 "Simulation: write the scanner positions that coverage was judged from (CSV)");
   app.add_flag("--quiet", options.quiet, "No progress on the terminal");
   try {
     app.parse(argc, argv);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "mission/files.hpp"
 #include "nav/polygons.hpp"
 #include "nav/raster.hpp"
 #include "sim/ground.hpp"
@@ -32,8 +33,7 @@ sim::ScannerModel scanner_model(const RobotConfig& robot) {
           .elevation_max_rad = radians(scanner.elevation_max_deg),
           .elevation_step_rad = radians(scanner.elevation_step_deg),
           .scan_s = scanner.scan_s,
-          .range_sigma_m = robot.sim.range_sigma_m,
-          .grazing_start_rad = radians(scanner.grazing_max_deg)};
+          .range_sigma_m = robot.sim.range_sigma_m};
 }
 
 sim::WorldConfig world_config(const MissionConfig& config, const SiteTasks& tasks, int threads) {
@@ -142,10 +142,18 @@ SimBackend::SimBackend(const MissionConfig& config, const SiteTasks& tasks, SimS
 }
 
 Truth SimBackend::judge(RunRecord& record, const SiteModel& model,
-                        const std::vector<AreaTask>& tasks) const {
+                        const std::vector<AreaTask>& tasks,
+                        const std::filesystem::path& cells_file) const {
   Truth truth;
   judge_poses(record, truth);
-  judge_surface(record, model, tasks, truth);
+  const std::vector<Eigen::Vector3d> positions = scanner_positions(record, model, tasks);
+  judge_surface(record, model, positions, truth);
+  if (!cells_file.empty()) {
+    std::string text;
+    for (const Eigen::Vector3d& p : positions)
+      text += fmt::format("{},{},{}\n", p.x(), p.y(), p.z());
+    write_file(cells_file, {text}).value();
+  }
   return truth;
 }
 
@@ -168,21 +176,26 @@ void SimBackend::judge_poses(RunRecord& record, Truth& truth) const {
   truth.nees_mean = nees / scans;
 }
 
-void SimBackend::judge_surface(const RunRecord& record, const SiteModel& model,
-                               const std::vector<AreaTask>& tasks, Truth& truth) const {
-  const ScannerConfig& scanner = config_.robot.scanner;
+// Where the scans were taken, then every cell on which the robot or a tripod could really stand in
+// the areas that were surveyed.
+std::vector<Eigen::Vector3d> SimBackend::scanner_positions(
+    const RunRecord& record, const SiteModel& model, const std::vector<AreaTask>& tasks) const {
   std::vector<Eigen::Vector3d> positions;
   for (const ScanRecord& scan : record.scans)
     positions.emplace_back(scan.truth->position_m.x(), scan.truth->position_m.y(),
-                           scan.ground_z_m + scanner.height_m);
-  const std::size_t stations = positions.size();
-  // Every cell on which the robot or a tripod could really stand, in the areas that were surveyed.
+                           scan.ground_z_m + config_.robot.scanner.height_m);
   for (const ViewCell& cell : model.cells()) {
     const Eigen::Vector3d position_m = model.cell_position_m(cell);
     const double ground_z_m = tasks[static_cast<std::size_t>(cell.task)].area.ground_z_m;
     if (world_.standing({position_m.head<2>(), 0}, ground_z_m, config_.robot.body.radius_m))
       positions.push_back(position_m);
   }
+  return positions;
+}
+
+void SimBackend::judge_surface(const RunRecord& record, const SiteModel& model,
+                               const std::vector<Eigen::Vector3d>& positions, Truth& truth) const {
+  const ScannerConfig& scanner = config_.robot.scanner;
   const planning::VoxelGrid& grid = model.map().grid();
   const sim::SurfaceTruth surface = sim::judge_surface(
       site_.mesh, scene_,
@@ -196,7 +209,7 @@ void SimBackend::judge_surface(const RunRecord& record, const SiteModel& model,
        .grazing_max_rad = radians(scanner.grazing_max_deg),
        .elevation_min_rad = radians(scanner.elevation_min_deg),
        .elevation_max_rad = radians(scanner.elevation_max_deg)},
-      positions, stations,
+      positions, record.scans.size(),
       [&](int x, int y, int z) {
         return model.map().at({x, y, z}) == planning::VoxelState::seen_occupied;
       },

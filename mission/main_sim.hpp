@@ -47,13 +47,18 @@ class SimBackend {
   // Runs until done() holds, or nothing is left to run.
   bool run(const std::function<bool()>& done) { return clock_.run(done); }
 
-  // Puts the true poses beside the believed ones and counts the surface that was to be seen.
-  Truth judge(RunRecord& record, const SiteModel& model, const std::vector<AreaTask>& tasks) const;
+  // Puts the true poses beside the believed ones and counts the surface that was to be seen. Writes
+  // the scanner positions that it judged from, one "x_m,y_m,z_m" a line, the scans first, where
+  // cells_file is not empty.
+  Truth judge(RunRecord& record, const SiteModel& model, const std::vector<AreaTask>& tasks,
+              const std::filesystem::path& cells_file) const;
 
  private:
   void judge_poses(RunRecord& record, Truth& truth) const;
   void judge_surface(const RunRecord& record, const SiteModel& model,
-                     const std::vector<AreaTask>& tasks, Truth& truth) const;
+                     const std::vector<Eigen::Vector3d>& positions, Truth& truth) const;
+  std::vector<Eigen::Vector3d> scanner_positions(const RunRecord& record, const SiteModel& model,
+                                                 const std::vector<AreaTask>& tasks) const;
 
   const MissionConfig config_;
   const int threads_;

@@ -7,9 +7,11 @@
 #include <vector>
 
 #include "hal/values.hpp"
+#include "mission/config.hpp"
 #include "nav/free_space.hpp"
 #include "nav/site_map.hpp"
 #include "planning/cover.hpp"
+#include "planning/voxel_map.hpp"
 
 namespace mission {
 
@@ -22,29 +24,30 @@ struct VoxelCounts {
 };
 
 struct ScanRecord {
-  int number{};       // 1, 2, ...: scans/0001.ply
+  int number{};           // 1, 2, ...: scans/0001.ply
   bool next_best_view{};  // false: a station of Phase I
-  std::string name;   // "inner 3", "NBV 2"
+  std::string name;       // "inner 3", "NBV 2"
   std::string area;
-  bool by_hand{};     // Placed by a person.
+  bool by_hand{};  // Placed by a person.
   hal::Pose2 planned;
-  hal::Pose2 believed;            // Where the localizer says the scan was taken.
-  double sigma_position_m{};      // Its own claim, 1-sigma.
+  hal::Pose2 believed;        // Where the localizer says the scan was taken.
+  double sigma_position_m{};  // Its own claim, 1-sigma.
   double sigma_heading_rad{};
-  std::optional<hal::Pose2> truth;  // In simulation.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // Of (x m, y m, heading rad), in W.
+  std::optional<hal::Pose2> truth;                       // In simulation.
   double ground_z_m{};
-  double start_s{};   // Mission time.
+  double start_s{};  // Mission time.
   double end_s{};
   double driven_m{};  // On the way here.
   std::uint64_t beams{};
   std::uint64_t points{};
   std::uint64_t points_outside_box{};
-  double adds_m{};      // Phase I, planned
-  double overlaps_m{};  // Phase I, planned
+  double adds_m{};                   // Phase I, planned
+  double overlaps_m{};               // Phase I, planned
   std::uint64_t predicted_voxels{};  // NBV: boundary unseen voxels it should see.
   std::uint64_t resolved_voxels{};   // Of those, no longer unseen afterwards.
   VoxelCounts after;
-  std::uint64_t visible_to_next{};   // Best tally after this scan: what the next view would see.
+  std::uint64_t visible_to_next{};  // Best tally after this scan: what the next view would see.
 };
 
 // A station that was planned and not scanned.
@@ -73,7 +76,7 @@ struct Truth {
   double position_error_max_m{};    // Believed against true pose, over all scans.
   double position_error_rms_m{};
   double heading_error_max_rad{};
-  double nees_mean{};               // 3 expected when the covariance is honest.
+  double nees_mean{};  // 3 expected when the covariance is honest.
 };
 
 struct RunRecord {
@@ -88,6 +91,8 @@ struct RunRecord {
   std::vector<ScanRecord> scans;
   std::vector<DroppedStation> dropped;
   std::vector<std::vector<Eigen::Vector2d>> driven_m;  // Believed tracks, one per leg.
+  ScannerConfig scanner;
+  planning::VoxelGrid grid;
   double voxel_m{};
   int gain_min_voxels{};
   double mission_s{};

@@ -56,6 +56,7 @@ planning::VoxelGrid voxel_grid(const MissionConfig& config, const nav::SiteMap& 
   const double voxel_m = config.phase2.voxel_m;
   Bounds bounds;
   bounds.add(map.boundary);
+  bounds.add(map.obstacles);
   double ground_low_m = map.ground_z_m;
   for (const AreaTask& task : tasks) {
     bounds.add(task.area.drivable);
@@ -79,6 +80,9 @@ SiteModel::SiteModel(const MissionConfig& config, const nav::SiteMap& map,
       map_(voxel_grid(config, map, tasks_)) {
   find_cells();
   const planning::VoxelGrid& grid = map_.grid();
+  const nav::RasterGrid columns{grid.W_min_m.head<2>(), grid.voxel_m, grid.nx, grid.ny};
+  in_site_ = nav::rasterize(map.boundary, columns);
+  find_ground(columns);
   tries_.assign(grid.size(), 0);
   excluded_.assign(cells_.size(), 0);
   obstacle_grid_ = {grid.W_min_m.head<2>(), kObstacleCellM,
@@ -110,6 +114,33 @@ void SiteModel::find_cells() {
   }
 }
 
+// The voxels that hold the mapped ground: their tops are air, so beams that skim it cross them.
+void SiteModel::find_ground(const nav::RasterGrid& columns) {
+  const planning::VoxelGrid& grid = map_.grid();
+  for (const AreaTask& task : tasks_) {
+    const int z = grid.voxel_at({grid.W_min_m.x(), grid.W_min_m.y(), task.area.ground_z_m}).z;
+    const auto inside = nav::rasterize(task.area.drivable, columns);
+    for (int y = 0; y < grid.ny; ++y)
+      for (int x = 0; x < grid.nx; ++x)
+        if (inside[columns.index(x, y)]) ground_.push_back({x, y, z});
+  }
+}
+
+// A beam over the ground proves nothing of the ground: what it carved there is unseen again.
+void SiteModel::restore_ground() {
+  for (const planning::Voxel& v : ground_)
+    if (map_.at(v) == planning::VoxelState::seen_empty) map_.set(v, planning::VoxelState::unseen);
+}
+
+// The frontier of what is seen, as far as it lies within the site's boundary.
+void SiteModel::find_boundary() {
+  boundary_ = planning::boundary_unseen(map_);
+  const auto columns = static_cast<std::size_t>(map_.grid().nx);
+  std::erase_if(boundary_, [&](const planning::BoundaryVoxel& u) {
+    return !in_site_[static_cast<std::size_t>(u.v.y) * columns + static_cast<std::size_t>(u.v.x)];
+  });
+}
+
 Eigen::Vector3d SiteModel::cell_position_m(const ViewCell& cell) const {
   Eigen::Vector3d position_m = map_.grid().center_m(cell.voxel);
   position_m.z() =
@@ -127,7 +158,8 @@ ScanEffect SiteModel::add(const hal::ScanCloud& scan,
   insert.ground_z_m = ground_z_m;
   insert.threads = threads_;
   const planning::InsertReport report = map_.insert(scan, T_W_S, insert);
-  boundary_ = planning::boundary_unseen(map_);
+  restore_ground();
+  find_boundary();
 
   ScanEffect effect;
   effect.points_outside_box = report.returns_outside;

@@ -15,7 +15,7 @@
 
 namespace mission {
 
-// The voxel box: x and y hold the areas and the obstacles that face them; z from the lowest ground,
+// The voxel box: x and y hold the boundary, the obstacles and the areas; z from the lowest ground,
 // which lies 0.1 voxel below the top of its layer, so that range noise on the ground stays in the
 // layer and beams that skim the ground do not carve it.
 planning::VoxelGrid voxel_grid(const MissionConfig& config, const nav::SiteMap& map,
@@ -78,6 +78,9 @@ class SiteModel {
   static constexpr int kTriesMax = 2;
 
   void find_cells();
+  void find_ground(const nav::RasterGrid& columns);
+  void restore_ground();
+  void find_boundary();
   std::vector<planning::BoundaryVoxel> worth_seeing() const;
   void note_obstacle(const Eigen::Vector3f& W_point_m, double ground_z_m, ScanEffect& effect);
 
@@ -85,7 +88,9 @@ class SiteModel {
   const std::vector<AreaTask> tasks_;
   const int threads_;
   planning::VoxelMap map_;
-  std::vector<planning::BoundaryVoxel> boundary_;
+  std::vector<planning::BoundaryVoxel> boundary_;  // Within the site's boundary only.
+  std::vector<std::uint8_t> in_site_;              // Per column of voxels.
+  std::vector<planning::Voxel> ground_;            // Hold the mapped ground; never seen-empty.
   std::vector<ViewCell> cells_;
   std::vector<std::uint8_t> tries_;     // Per voxel.
   std::vector<std::uint8_t> excluded_;  // Per cells_ index.

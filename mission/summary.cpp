@@ -166,6 +166,23 @@ json::object counts_json(const RunRecord& record) {
           {"by_hand", by_hand}};
 }
 
+json::object sensor_json(const ScannerConfig& scanner) {
+  return {{"height_m", scanner.height_m},
+          {"range_min_m", scanner.range_min_m},
+          {"range_max_m", scanner.range_max_m},
+          {"grazing_max_deg", scanner.grazing_max_deg},
+          {"elevation_min_deg", scanner.elevation_min_deg},
+          {"elevation_max_deg", scanner.elevation_max_deg}};
+}
+
+// Not rounded: the lower corner of the voxel box decides which voxel a point lies in.
+json::object grid_json(const planning::VoxelGrid& grid) {
+  return {{"min_m", {grid.W_min_m.x(), grid.W_min_m.y(), grid.W_min_m.z()}},
+          {"nx", grid.nx},
+          {"ny", grid.ny},
+          {"nz", grid.nz}};
+}
+
 }  // namespace
 
 json::object summarise(const RunRecord& record, const ProductFacts& products) {
@@ -179,6 +196,8 @@ json::object summarise(const RunRecord& record, const ProductFacts& products) {
                        {"driven_m", mm(record.driven_total_m)},
                        {"voxel_m", record.voxel_m},
                        {"gain_min_voxels", record.gain_min_voxels}};
+  summary["sensor"] = sensor_json(record.scanner);
+  summary["grid"] = grid_json(record.grid);
   summary["counts"] = counts_json(record);
   summary["coverage"] = coverage_json(record);
   summary["voxels"] =

@@ -88,6 +88,8 @@ Survey::Survey(const MissionConfig& config, const nav::SiteMap& map, SiteTasks t
   record_.seed = config.seed;
   record_.map = map;
   record_.notes = tasks_.notes;
+  record_.scanner = config.robot.scanner;
+  record_.grid = model_.map().grid();
   record_.voxel_m = config.phase2.voxel_m;
   record_.gain_min_voxels = config.phase2.gain_min_voxels;
 }

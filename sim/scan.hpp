@@ -24,7 +24,7 @@ struct ScannerModel {
   double scan_s = 300.0;
   double range_sigma_m = 0.01;
   // Beams that graze a surface come back too weak: see lost_share.
-  double grazing_start_rad = 70 * 0.017453292519943295;
+  double grazing_start_rad = 80 * 0.017453292519943295;
   double grazing_end_rad = 89 * 0.017453292519943295;
   double lost_share_max = 0.95;  // 0: no beam is lost.
 };

@@ -200,11 +200,11 @@ void add_yard(Model& model) {
   Part(model, "cistern").cone({-43.3, 43.1}, 2.4, 12, 2.4, 3.6);
 }
 
-// In the outer court, and in no map.
-void add_powder_magazine(Model& model) {
-  const Part magazine(model, "powder_magazine");
-  magazine.box(6.2, -47.2, 18.2, -39.2, 0, 3.4);
-  magazine.gable_x(6.0, -47.5, 18.4, -38.9, 3.4, 5.0);
+// In the moat before the east curtain, and in no map: it hides much of the scarp.
+void add_gun_shed(Model& model) {
+  const Part shed(model, "gun_shed");
+  shed.box(71.2, -13.2, 80.8, 12.8, kMoatZ, 2.6);
+  shed.gable_y(70.9, -13.5, 81.1, 13.1, 2.6, 5.4);
 }
 
 Path bridge_pier() {
@@ -312,12 +312,14 @@ barracks and rampart, a dry moat, a glacis. 300 x 300 m in all, nothing above 22
   which the scanner looks over, closes the passage under the west barracks.
 - Ramparts in steps that the map does not show: walkway at 3 m, firing step at 4 m, parapet at 5.2
   m, scarp leaning back 1 in 8; the counterscarp stands up to 1 m, and the glacis falls to 0 m.
-- `powder_magazine` (12 x 8 x 5 m, outer court, south) stands in the model and not in the map.
+- `gun_shed` (26 x 10 x 9 m, in the moat before the east curtain) stands in the model and not in
+  the map, and hides the scarp behind it.
 - Porch roofs, eaves, the passage under the west barracks and the bridge hang over free ground.
 - Faults of drawn maps: the ring of `barracks south` is left open; `barracks east` repeats a
   vertex; the southern half of `barracks west` runs clockwise; the link walls reach 5 cm into the
   barracks; the barrier reaches 3 cm, `stairs east` 4 cm into its neighbour; the other stairs
-  touch the rampart edge to edge; the glacis fills the map up to its boundary.
+  touch the rampart edge to edge; the glacis reaches beyond the boundary
+  of the survey, which runs 8 m outside the counterscarp.
 )";
 
 }  // namespace
@@ -329,9 +331,10 @@ Site make_fort() {
   add_stairs(site.model);
   add_barracks(site.model);
   add_yard(site.model);
-  add_powder_magazine(site.model);
+  add_gun_shed(site.model);
   add_bridge_and_gate(site.model);
-  site.boundary(square(150), false);
+  // The survey ends just beyond the moat: the air over the glacis is nobody's concern.
+  site.boundary(moved_edges(counterscarp_foot(), 8), false);
   map_obstacles(site);
   map_regions(site);
   site.start({-6.5, -11.0}, 90);

@@ -182,7 +182,7 @@ TEST_P(EverySite, IsOpenWhereTheMapSaysFreeButForTheMissingBuilding) {
   EXPECT_GT(points.size(), 200u);
   int inside_missing = 0;
   for (const Vector3d& p : points) {
-    const bool missing = fort && p.x() > 6 && p.x() < 18.4 && p.y() > -47.5 && p.y() < -38.9;
+    const bool missing = fort && p.x() > 70.9 && p.x() < 81.1 && p.y() > -13.5 && p.y() < 13.1;
     const Above floor = columns.above(p - Vector3d(0, 0, 0.01));
     EXPECT_NEAR(floor.first_z, p.z(), 1e-6) << "no ground at " << p.transpose();
     const int winding = columns.above(p + Vector3d(0, 0, 0.5)).winding;

@@ -1,0 +1,177 @@
+// Whole missions by the shipped program: what the README promises.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <boost/json.hpp>
+#include <cstdlib>
+#include <fstream>
+
+#include "run_mission.hpp"
+
+namespace {
+
+using missions::Run;
+
+double number(const boost::json::value& value) {
+  return value.to_number<double>();
+}
+
+class Sites : public testing::TestWithParam<std::string> {};
+
+// One run per site serves all claims about it: a mission costs most of a minute.
+TEST_P(Sites, AreSurveyedToTheEnd) {
+  const std::string site = GetParam();
+  const Run run = missions::run(missions::configs() / "missions" / (site + ".toml"), site);
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  ASSERT_TRUE(run.summary.is_object()) << run.output;
+  RecordProperty("wall_s", std::to_string(run.wall_s));
+  RecordProperty("peak_rss_mib", std::to_string(run.peak_rss_mib));
+  EXPECT_TRUE(run.summary.at("completed").as_bool());
+  EXPECT_LT(run.peak_rss_mib, 2048);
+  std::printf("%s: %.1f s, %.0f MiB, %s\n", site.c_str(), run.wall_s, run.peak_rss_mib,
+              run.summary.at("end").as_string().c_str());
+
+  // Phase I: the share of what any station could cover that the plan covers, per area.
+  const double goal = site == "church" ? 0.95 : 0.98;
+  for (const auto& area : run.object("coverage").at("areas").as_array()) {
+    const double coverable_m = number(area.at("coverable_m"));
+    EXPECT_GE(number(area.at("planned_m")), goal * coverable_m) << area.at("name").as_string();
+    EXPECT_GT(coverable_m, 0) << area.at("name").as_string();
+  }
+
+  // The columns of the paper's tables: occupied rises, boundary unseen falls over Phase II.
+  const auto& scans = run.summary.at("scans").as_array();
+  double occupied = 0, boundary_before = -1, boundary_after = -1;
+  for (const auto& scan : scans) {
+    const auto& after = scan.at("after").as_object();
+    EXPECT_GE(number(after.at("seen_occupied")), occupied);
+    occupied = number(after.at("seen_occupied"));
+    EXPECT_GE(number(scan.at("points")), 1e6);
+    boundary_after = number(after.at("boundary_unseen"));
+    if (scan.at("kind").as_string() == "station") boundary_before = boundary_after;
+  }
+  EXPECT_LE(boundary_after, boundary_before);
+
+  // Judged by the mesh that the mission never saw.
+  const auto& truth = run.object("truth");
+  EXPECT_GE(number(truth.at("seen_of_visible")), 0.95);
+  EXPECT_LT(number(truth.at("position_error_max_m")), 0.15);
+
+  for (const char* product : {"cloud.ply", "map.ot", "decisions.jsonl", "report.html"})
+    EXPECT_GT(std::filesystem::file_size(run.folder / product), 0U) << product;
+  std::filesystem::remove_all(run.folder);
+}
+
+INSTANTIATE_TEST_SUITE_P(Shipped, Sites,
+                         testing::Values("fort", "tower", "courtyard", "church", "museum"),
+                         [](const auto& param) { return param.param; });
+
+TEST(Missions, RepeatByteForByteWithTheSameSeedAndAnyNumberOfThreads) {
+  const auto mission = missions::configs() / "missions" / "courtyard.toml";
+  const Run one = missions::run(mission, "repeat-1", {"--threads", "1"});
+  const Run two = missions::run(mission, "repeat-2", {"--threads", "2"});
+  ASSERT_EQ(one.exit_code, 0) << one.output;
+  ASSERT_EQ(two.exit_code, 0) << two.output;
+  const std::string decisions = missions::read_text(one.folder / "decisions.jsonl");
+  EXPECT_GT(decisions.size(), 1000U);
+  EXPECT_EQ(decisions, missions::read_text(two.folder / "decisions.jsonl"));
+  EXPECT_EQ(missions::read_text(one.folder / "summary.json"),
+            missions::read_text(two.folder / "summary.json"));
+  const Run other = missions::run(mission, "repeat-3", {"--seed", "99"});
+  ASSERT_EQ(other.exit_code, 0) << other.output;
+  EXPECT_NE(decisions, missions::read_text(other.folder / "decisions.jsonl"));
+  for (const Run* run : {&one, &two, &other}) std::filesystem::remove_all(run->folder);
+}
+
+TEST(Missions, SurviveTwentySeeds) {
+  const int seeds = std::getenv("VANTAGE_NIGHTLY") != nullptr ? 100 : 20;
+  for (int seed = 1000; seed < 1000 + seeds; ++seed) {
+    const Run run = missions::run(missions::configs() / "missions" / "courtyard.toml", "seeds",
+                                  {"--seed", std::to_string(seed), "--quiet"});
+    ASSERT_EQ(run.exit_code, 0) << "seed " << seed << ": " << run.output;
+    EXPECT_TRUE(run.summary.at("completed").as_bool()) << "seed " << seed;
+    std::filesystem::remove_all(run.folder);
+  }
+}
+
+// Broken input is refused with exit 2, says where and why, and writes nothing.
+struct Broken {
+  const char* name;
+  const char* footprint;  // Written into a site folder of its own; empty: no file.
+  const char* phase2;     // Appended to the mission.
+  const char* says;       // A part of the message.
+};
+
+const Broken kBroken[] = {
+    {"NoFootprint", "", "", "footprint.geojson"},
+    {"NotJson", "{\"type\": \"FeatureCollection\", ", "", "footprint.geojson:1"},
+    {"BowTie", R"({"type":"Polygon","coordinates":[[[0,0],[20,20],[20,0],[0,20],[0,0]]]})", "",
+     "cross"},
+    {"RegionWithoutFreeSpace",
+     R"({"type":"FeatureCollection","features":[
+       {"type":"Feature","properties":{},"geometry":{"type":"Polygon","coordinates":[[[0,0],[9,0],[9,9],[0,9],[0,0]]]}},
+       {"type":"Feature","properties":{"role":"region","name":"yard"},"geometry":{"type":"Polygon","coordinates":[[[2,2],[7,2],[7,7],[2,7],[2,2]]]}}]})",
+     "", "yard"},
+    {"ZeroVoxels", R"({"type":"Polygon","coordinates":[[[0,0],[9,0],[9,9],[0,9],[0,0]]]})",
+     "[phase2]\nvoxel_m = 0\n", "voxel_m"},
+};
+
+class BrokenInput : public testing::TestWithParam<Broken> {};
+
+TEST_P(BrokenInput, IsRefusedAndNothingIsWritten) {
+  const Broken& broken = GetParam();
+  const auto base = std::filesystem::temp_directory_path() /
+                    ("vantage-broken-" + std::to_string(getpid()) + "-" + broken.name);
+  std::filesystem::create_directories(base / "site");
+  if (*broken.footprint) std::ofstream(base / "site" / "footprint.geojson") << broken.footprint;
+  std::ofstream(base / "site" / "model.obj") << "v 0 0 0\nv 9 0 0\nv 0 9 0\nf 1 2 3\n";
+  std::ofstream(base / "mission.toml") << "site = \"site\"\n" << broken.phase2;
+  const Run run = missions::run(base / "mission.toml", std::string("broken-") + broken.name);
+  EXPECT_EQ(run.exit_code, 2) << run.output;
+  EXPECT_NE(run.output.find(broken.says), std::string::npos) << run.output;
+  EXPECT_FALSE(std::filesystem::exists(run.folder));
+  std::filesystem::remove_all(base);
+}
+
+INSTANTIATE_TEST_SUITE_P(Missions, BrokenInput, testing::ValuesIn(kBroken),
+                         [](const auto& param) { return std::string(param.param.name); });
+
+// The judge in tests/sim shares no code with the simulation's own.
+TEST(Missions, AreJudgedAlikeByAnIndependentBruteForce) {
+  for (const std::string site : {"courtyard", "fort"}) {
+    const auto cells = std::filesystem::temp_directory_path() /
+                       ("vantage-cells-" + std::to_string(getpid()) + ".csv");
+    const Run run = missions::run(missions::configs() / "missions" / (site + ".toml"),
+                                  "judged-" + site, {"--quiet", "--judge-cells", cells.string()});
+    ASSERT_EQ(run.exit_code, 0) << run.output;
+    const Run judged = missions::judge(missions::configs() / "sites" / site / "model.obj",
+                                       run.folder, cells, site == "fort" ? 40 : 10);
+    EXPECT_EQ(judged.exit_code, 0) << judged.output;
+    std::printf("%s: %s", site.c_str(), judged.output.c_str());
+    std::filesystem::remove_all(run.folder);
+    std::filesystem::remove(cells);
+  }
+}
+
+// The paper's threshold leaves small pockets; five voxels leave next to none.
+TEST(Missions, SeeNinetyNinePercentAtTheLowThreshold) {
+  std::vector<std::string> sites{"courtyard"};
+  if (std::getenv("VANTAGE_NIGHTLY") != nullptr)
+    sites = {"fort", "tower", "courtyard", "church", "museum"};
+  for (const std::string& site : sites) {
+    const auto shipped = missions::configs() / "missions" / (site + ".toml");
+    std::string text = missions::read_text(shipped);
+    const auto key = text.find("gain_min_voxels");
+    ASSERT_NE(key, std::string::npos);
+    text.replace(key, text.find('\n', key) - key, "gain_min_voxels = 5\nviews_max = 1000");
+    const auto low = missions::configs() / "missions" / ("." + site + "-low.toml");
+    std::ofstream(low) << text;
+    const Run run = missions::run(low, "low-" + site, {"--quiet"});
+    std::filesystem::remove(low);
+    ASSERT_EQ(run.exit_code, 0) << run.output;
+    EXPECT_GE(number(run.object("truth").at("seen_of_visible")), 0.99) << site << run.output;
+    std::filesystem::remove_all(run.folder);
+  }
+}
+
+}  // namespace
