@@ -10,7 +10,7 @@
 
 namespace {
 
-using missions::Run;
+using missions::MissionRun;
 
 double number(const boost::json::value& value) {
   return value.to_number<double>();
@@ -21,7 +21,7 @@ class Sites : public testing::TestWithParam<std::string> {};
 // One run per site serves all claims about it: a mission costs most of a minute.
 TEST_P(Sites, AreSurveyedToTheEnd) {
   const std::string site = GetParam();
-  const Run run = missions::run(missions::configs() / "missions" / (site + ".toml"), site);
+  const MissionRun run = missions::run(missions::configs() / "missions" / (site + ".toml"), site);
   ASSERT_EQ(run.exit_code, 0) << run.output;
   ASSERT_TRUE(run.summary.is_object()) << run.output;
   RecordProperty("wall_s", std::to_string(run.wall_s));
@@ -32,7 +32,7 @@ TEST_P(Sites, AreSurveyedToTheEnd) {
               run.summary.at("end").as_string().c_str());
 
   // Phase I: the share of what any station could cover that the plan covers, per area.
-  const double goal = site == "church" ? 0.95 : 0.98;
+  const double goal = site == "fort" ? 0.98 : 0.95;
   for (const auto& area : run.object("coverage").at("areas").as_array()) {
     const double coverable_m = number(area.at("coverable_m"));
     EXPECT_GE(number(area.at("planned_m")), goal * coverable_m) << area.at("name").as_string();
@@ -68,8 +68,8 @@ INSTANTIATE_TEST_SUITE_P(Shipped, Sites,
 
 TEST(Missions, RepeatByteForByteWithTheSameSeedAndAnyNumberOfThreads) {
   const auto mission = missions::configs() / "missions" / "courtyard.toml";
-  const Run one = missions::run(mission, "repeat-1", {"--threads", "1"});
-  const Run two = missions::run(mission, "repeat-2", {"--threads", "2"});
+  const MissionRun one = missions::run(mission, "repeat-1", {"--threads", "1"});
+  const MissionRun two = missions::run(mission, "repeat-2", {"--threads", "2"});
   ASSERT_EQ(one.exit_code, 0) << one.output;
   ASSERT_EQ(two.exit_code, 0) << two.output;
   const std::string decisions = missions::read_text(one.folder / "decisions.jsonl");
@@ -77,17 +77,17 @@ TEST(Missions, RepeatByteForByteWithTheSameSeedAndAnyNumberOfThreads) {
   EXPECT_EQ(decisions, missions::read_text(two.folder / "decisions.jsonl"));
   EXPECT_EQ(missions::read_text(one.folder / "summary.json"),
             missions::read_text(two.folder / "summary.json"));
-  const Run other = missions::run(mission, "repeat-3", {"--seed", "99"});
+  const MissionRun other = missions::run(mission, "repeat-3", {"--seed", "99"});
   ASSERT_EQ(other.exit_code, 0) << other.output;
   EXPECT_NE(decisions, missions::read_text(other.folder / "decisions.jsonl"));
-  for (const Run* run : {&one, &two, &other}) std::filesystem::remove_all(run->folder);
+  for (const MissionRun* run : {&one, &two, &other}) std::filesystem::remove_all(run->folder);
 }
 
 TEST(Missions, SurviveTwentySeeds) {
   const int seeds = std::getenv("VANTAGE_NIGHTLY") != nullptr ? 100 : 20;
   for (int seed = 1000; seed < 1000 + seeds; ++seed) {
-    const Run run = missions::run(missions::configs() / "missions" / "courtyard.toml", "seeds",
-                                  {"--seed", std::to_string(seed), "--quiet"});
+    const MissionRun run = missions::run(missions::configs() / "missions" / "courtyard.toml",
+                                         "seeds", {"--seed", std::to_string(seed), "--quiet"});
     ASSERT_EQ(run.exit_code, 0) << "seed " << seed << ": " << run.output;
     EXPECT_TRUE(run.summary.at("completed").as_bool()) << "seed " << seed;
     std::filesystem::remove_all(run.folder);
@@ -110,8 +110,9 @@ const Broken kBroken[] = {
     {"RegionWithoutFreeSpace",
      R"({"type":"FeatureCollection","features":[
        {"type":"Feature","properties":{},"geometry":{"type":"Polygon","coordinates":[[[0,0],[9,0],[9,9],[0,9],[0,0]]]}},
-       {"type":"Feature","properties":{"role":"region","name":"yard"},"geometry":{"type":"Polygon","coordinates":[[[2,2],[7,2],[7,7],[2,7],[2,2]]]}}]})",
-     "", "yard"},
+       {"type":"Feature","properties":{"role":"region","name":"yard"},"geometry":{"type":"Polygon","coordinates":[[[2,2],[7,2],[7,7],[2,7],[2,2]]]}},
+       {"type":"Feature","properties":{"role":"region","name":"street"},"geometry":{"type":"Polygon","coordinates":[[[10,0],[30,0],[30,9],[10,9],[10,0]]]}}]})",
+     "[regions]\nyard = \"manual\"\n", "yard"},
     {"ZeroVoxels", R"({"type":"Polygon","coordinates":[[[0,0],[9,0],[9,9],[0,9],[0,0]]]})",
      "[phase2]\nvoxel_m = 0\n", "voxel_m"},
 };
@@ -126,7 +127,7 @@ TEST_P(BrokenInput, IsRefusedAndNothingIsWritten) {
   if (*broken.footprint) std::ofstream(base / "site" / "footprint.geojson") << broken.footprint;
   std::ofstream(base / "site" / "model.obj") << "v 0 0 0\nv 9 0 0\nv 0 9 0\nf 1 2 3\n";
   std::ofstream(base / "mission.toml") << "site = \"site\"\n" << broken.phase2;
-  const Run run = missions::run(base / "mission.toml", std::string("broken-") + broken.name);
+  const MissionRun run = missions::run(base / "mission.toml", std::string("broken-") + broken.name);
   EXPECT_EQ(run.exit_code, 2) << run.output;
   EXPECT_NE(run.output.find(broken.says), std::string::npos) << run.output;
   EXPECT_FALSE(std::filesystem::exists(run.folder));
@@ -141,11 +142,12 @@ TEST(Missions, AreJudgedAlikeByAnIndependentBruteForce) {
   for (const std::string site : {"courtyard", "fort"}) {
     const auto cells = std::filesystem::temp_directory_path() /
                        ("vantage-cells-" + std::to_string(getpid()) + ".csv");
-    const Run run = missions::run(missions::configs() / "missions" / (site + ".toml"),
-                                  "judged-" + site, {"--quiet", "--judge-cells", cells.string()});
+    const MissionRun run =
+        missions::run(missions::configs() / "missions" / (site + ".toml"), "judged-" + site,
+                      {"--quiet", "--judge-cells", cells.string()});
     ASSERT_EQ(run.exit_code, 0) << run.output;
-    const Run judged = missions::judge(missions::configs() / "sites" / site / "model.obj",
-                                       run.folder, cells, site == "fort" ? 40 : 10);
+    const MissionRun judged = missions::judge(missions::configs() / "sites" / site / "model.obj",
+                                              run.folder, cells, site == "fort" ? 40 : 10);
     EXPECT_EQ(judged.exit_code, 0) << judged.output;
     std::printf("%s: %s", site.c_str(), judged.output.c_str());
     std::filesystem::remove_all(run.folder);
@@ -166,7 +168,7 @@ TEST(Missions, SeeNinetyNinePercentAtTheLowThreshold) {
     text.replace(key, text.find('\n', key) - key, "gain_min_voxels = 5\nviews_max = 1000");
     const auto low = missions::configs() / "missions" / ("." + site + "-low.toml");
     std::ofstream(low) << text;
-    const Run run = missions::run(low, "low-" + site, {"--quiet"});
+    const MissionRun run = missions::run(low, "low-" + site, {"--quiet"});
     std::filesystem::remove(low);
     ASSERT_EQ(run.exit_code, 0) << run.output;
     EXPECT_GE(number(run.object("truth").at("seen_of_visible")), 0.99) << site << run.output;

@@ -14,7 +14,8 @@ namespace missions {
 namespace {
 
 // Starts the program with both outputs in a file; the child's own resources tell its memory.
-void execute(const std::vector<std::string>& words, const std::filesystem::path& log, Run& run) {
+void execute(const std::vector<std::string>& words, const std::filesystem::path& log,
+             MissionRun& run) {
   const auto began = std::chrono::steady_clock::now();
   const pid_t child = fork();
   if (child == 0) {
@@ -48,9 +49,9 @@ std::string read_text(const std::filesystem::path& file) {
   return text.str();
 }
 
-Run judge(const std::filesystem::path& model, const std::filesystem::path& folder,
-          const std::filesystem::path& cells, int every) {
-  Run run;
+MissionRun judge(const std::filesystem::path& model, const std::filesystem::path& folder,
+                 const std::filesystem::path& cells, int every) {
+  MissionRun run;
   const auto log = cells.string() + ".log";
   execute({std::string(VANTAGE_BINARY_DIR) + "/tests/judge", model.string(), folder.string(),
            cells.string(), "--every", std::to_string(every)},
@@ -60,12 +61,12 @@ Run judge(const std::filesystem::path& model, const std::filesystem::path& folde
   return run;
 }
 
-Run run(const std::filesystem::path& mission, const std::string& folder_name,
-        const std::vector<std::string>& options) {
+MissionRun run(const std::filesystem::path& mission, const std::string& folder_name,
+               const std::vector<std::string>& options) {
   const auto base =
       std::filesystem::temp_directory_path() / ("vantage-missions-" + std::to_string(getpid()));
   std::filesystem::create_directories(base);
-  Run run;
+  MissionRun run;
   run.folder = base / folder_name;
   std::filesystem::remove_all(run.folder);
   std::vector<std::string> words{std::string(VANTAGE_BINARY_DIR) + "/vantaged", mission.string(),

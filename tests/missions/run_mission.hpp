@@ -8,7 +8,7 @@
 
 namespace missions {
 
-struct Run {
+struct MissionRun {
   int exit_code = -1;
   std::string output;  // stdout and stderr together
   double wall_s{};
@@ -24,12 +24,12 @@ struct Run {
 std::filesystem::path configs();  // configs/ of the sources
 
 // vantaged MISSION --out FOLDER OPTIONS...; the folder is emptied before.
-Run run(const std::filesystem::path& mission, const std::string& folder_name,
-        const std::vector<std::string>& options = {});
+MissionRun run(const std::filesystem::path& mission, const std::string& folder_name,
+               const std::vector<std::string>& options = {});
 
 // The independent judge over a run; output and exit code only.
-Run judge(const std::filesystem::path& model, const std::filesystem::path& folder,
-          const std::filesystem::path& cells, int every);
+MissionRun judge(const std::filesystem::path& model, const std::filesystem::path& folder,
+                 const std::filesystem::path& cells, int every);
 
 std::string read_text(const std::filesystem::path& file);
 
