@@ -19,12 +19,22 @@ struct PointMm {
 
 inline constexpr std::int64_t kCoordinateMax = std::int64_t{1} << 28;  // 268 km
 
-inline PointMm operator-(PointMm a, PointMm b) { return {a.x - b.x, a.y - b.y}; }
-inline PointMm operator+(PointMm a, PointMm b) { return {a.x + b.x, a.y + b.y}; }
-inline std::int64_t cross(PointMm a, PointMm b) { return a.x * b.y - a.y * b.x; }
-inline std::int64_t dot(PointMm a, PointMm b) { return a.x * b.x + a.y * b.y; }
+inline PointMm operator-(PointMm a, PointMm b) {
+  return {a.x - b.x, a.y - b.y};
+}
+inline PointMm operator+(PointMm a, PointMm b) {
+  return {a.x + b.x, a.y + b.y};
+}
+inline std::int64_t cross(PointMm a, PointMm b) {
+  return a.x * b.y - a.y * b.x;
+}
+inline std::int64_t dot(PointMm a, PointMm b) {
+  return a.x * b.x + a.y * b.y;
+}
 // > 0 where c lies left of the line from a to b.
-inline std::int64_t side(PointMm a, PointMm b, PointMm c) { return cross(b - a, c - a); }
+inline std::int64_t side(PointMm a, PointMm b, PointMm c) {
+  return cross(b - a, c - a);
+}
 
 inline PointMm to_mm(const Eigen::Vector2d& metres) {
   return {std::llround(metres.x() * 1000), std::llround(metres.y() * 1000)};
@@ -32,7 +42,9 @@ inline PointMm to_mm(const Eigen::Vector2d& metres) {
 inline Eigen::Vector2d to_m(PointMm point) {
   return {static_cast<double>(point.x) / 1000, static_cast<double>(point.y) / 1000};
 }
-inline double length_m(PointMm a, PointMm b) { return (to_m(b) - to_m(a)).norm(); }
+inline double length_m(PointMm a, PointMm b) {
+  return (to_m(b) - to_m(a)).norm();
+}
 
 struct SegmentMm {
   PointMm a, b;
