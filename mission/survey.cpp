@@ -117,7 +117,21 @@ hal::Task<void> Survey::survey() {
   for (std::size_t t = 0; t < record_.plans.size(); ++t) co_await tour(t);
   co_await refine();
   co_await go_home();
+  note_points_outside();
   record_.completed = true;
+}
+
+// A box that is too low hides what the scans saw above it: the operator has to know.
+void Survey::note_points_outside() {
+  std::uint64_t points = 0, outside = 0;
+  for (const ScanRecord& scan : record_.scans) {
+    points += scan.points;
+    outside += scan.points_outside_box;
+  }
+  if (outside * 1000 > points)
+    record_.notes.push_back(fmt::format(
+        "{} of {} points lie outside the voxel box: raise [phase2] height_m or margin_m", outside,
+        points));
 }
 
 void Survey::plan_stations() {

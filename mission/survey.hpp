@@ -48,6 +48,7 @@ class Survey {
   hal::Task<void> tour(std::size_t task);
   hal::Task<void> refine();
   hal::Task<void> go_home();
+  void note_points_outside();
 
   hal::Task<bool> visit(const Stop& stop);
   hal::Task<bool> drive(const Stop& stop, ScanRecord& scan);
