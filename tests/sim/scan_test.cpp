@@ -180,8 +180,8 @@ TEST(CastScan, RangeNoiseIsAsWideAsClaimed) {
 TEST(LostShare, RisesSmoothlyFromTheGrazingLimit) {
   const sim::ScannerModel model;
   EXPECT_EQ(sim::lost_share(model, 0), 0);
-  EXPECT_EQ(sim::lost_share(model, 70 * kDeg), 0);
-  EXPECT_NEAR(sim::lost_share(model, 79.5 * kDeg), 0.475, 1e-12);
+  EXPECT_EQ(sim::lost_share(model, 80 * kDeg), 0);
+  EXPECT_NEAR(sim::lost_share(model, 84.5 * kDeg), 0.475, 1e-12);
   EXPECT_NEAR(sim::lost_share(model, 89 * kDeg), 0.95, 1e-12);
   EXPECT_NEAR(sim::lost_share(model, 90 * kDeg), 0.95, 1e-12);
 }
