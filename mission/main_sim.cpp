@@ -10,6 +10,7 @@
 #include "nav/polygons.hpp"
 #include "nav/raster.hpp"
 #include "sim/ground.hpp"
+#include "sim/reachable.hpp"
 #include "sim/surface_truth.hpp"
 
 namespace mission {
@@ -21,6 +22,8 @@ constexpr double radians(double degrees) {
 
 // A ground sample every so far is enough to tell whether a model has a ground.
 constexpr double kGroundSampleM = 4.0;
+// Ways are looked for in steps of this: a gap that leaves the robot this much play is a way.
+constexpr double kReachCellM = 0.25;
 
 sim::ScannerModel scanner_model(const RobotConfig& robot) {
   const ScannerConfig& scanner = robot.scanner;
@@ -176,6 +179,36 @@ void SimBackend::judge_poses(RunRecord& record, Truth& truth) const {
   truth.nees_mean = nees / scans;
 }
 
+// The ground of an area that can really be reached from where its scans were taken: what the map
+// lacks may close off a part of it, and the inside of a shed is nobody's to stand in. Without any
+// scan there, all of it counts.
+std::function<bool(const Eigen::Vector2d&)> SimBackend::reachable_ground(
+    const RunRecord& record, const AreaTask& task) const {
+  const double ground_z_m = task.area.ground_z_m;
+  const auto stands = [this, ground_z_m](const Eigen::Vector2d& W_point_m) {
+    return world_.standing({W_point_m, 0}, ground_z_m, config_.robot.body.radius_m).has_value();
+  };
+  std::vector<Eigen::Vector2d> seeds;
+  for (const ScanRecord& scan : record.scans)
+    if (scan.area == task.area.name) seeds.push_back(scan.truth->position_m);
+  if (seeds.empty()) return stands;
+
+  Eigen::AlignedBox2d box;
+  for (const nav::SegmentMm& edge : nav::edges(task.area.standable)) box.extend(nav::to_m(edge.a));
+  const Eigen::Vector2d size = box.sizes() / kReachCellM;
+  const nav::RasterGrid raster{box.min(), kReachCellM, static_cast<int>(size.x()) + 1,
+                               static_cast<int>(size.y()) + 1};
+  const sim::GroundCells cells{raster.W_min_m, raster.cell_m, raster.nx, raster.ny};
+  const auto inside = nav::rasterize(task.area.standable, raster);
+  const auto reached = sim::reachable(cells, seeds, [&](const Eigen::Vector2d& W_point_m) {
+    return inside[static_cast<std::size_t>(cells.index_at(W_point_m))] && stands(W_point_m);
+  });
+  return [=](const Eigen::Vector2d& W_point_m) {
+    const std::int64_t index = cells.index_at(W_point_m);
+    return index >= 0 && reached[static_cast<std::size_t>(index)] && stands(W_point_m);
+  };
+}
+
 // Where the scans were taken, then every cell on which the robot or a tripod could really stand in
 // the areas that were surveyed.
 std::vector<Eigen::Vector3d> SimBackend::scanner_positions(
@@ -184,10 +217,11 @@ std::vector<Eigen::Vector3d> SimBackend::scanner_positions(
   for (const ScanRecord& scan : record.scans)
     positions.emplace_back(scan.truth->position_m.x(), scan.truth->position_m.y(),
                            scan.ground_z_m + config_.robot.scanner.height_m);
+  std::vector<std::function<bool(const Eigen::Vector2d&)>> reachable;
+  for (const AreaTask& task : tasks) reachable.push_back(reachable_ground(record, task));
   for (const ViewCell& cell : model.cells()) {
     const Eigen::Vector3d position_m = model.cell_position_m(cell);
-    const double ground_z_m = tasks[static_cast<std::size_t>(cell.task)].area.ground_z_m;
-    if (world_.standing({position_m.head<2>(), 0}, ground_z_m, config_.robot.body.radius_m))
+    if (reachable[static_cast<std::size_t>(cell.task)](position_m.head<2>()))
       positions.push_back(position_m);
   }
   return positions;

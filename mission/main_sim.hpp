@@ -4,6 +4,7 @@
 
 #include <boost/asio/io_context.hpp>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -57,6 +58,8 @@ class SimBackend {
   void judge_poses(RunRecord& record, Truth& truth) const;
   void judge_surface(const RunRecord& record, const SiteModel& model,
                      const std::vector<Eigen::Vector3d>& positions, Truth& truth) const;
+  std::function<bool(const Eigen::Vector2d&)> reachable_ground(const RunRecord& record,
+                                                               const AreaTask& task) const;
   std::vector<Eigen::Vector3d> scanner_positions(const RunRecord& record, const SiteModel& model,
                                                  const std::vector<AreaTask>& tasks) const;
 
