@@ -65,7 +65,13 @@ hal::Task<void> Pilot::track_imu() {
 }
 
 hal::Task<void> Pilot::track_gnss() {
-  for (;;) localizer_.correct((co_await devices_.gnss.next_fix()).value());
+  for (;;) {
+    const hal::GnssFix fix = (co_await devices_.gnss.next_fix()).value();
+    const nav::Gate gate = localizer_.correct(fix);
+    ++gnss_.fixes;
+    gnss_.refused += gate == nav::Gate::rejected;
+    gnss_.resets += gate == nav::Gate::reset;
+  }
 }
 
 hal::Task<LegEnd> Pilot::drive_to(Roads& roads, hal::Pose2 goal) {

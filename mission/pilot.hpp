@@ -9,6 +9,7 @@
 #include "hal/clock.hpp"
 #include "hal/devices.hpp"
 #include "mission/config.hpp"
+#include "mission/record.hpp"
 #include "mission/roads.hpp"
 #include "nav/follow.hpp"
 #include "nav/localizer.hpp"
@@ -37,6 +38,7 @@ class Pilot {
 
   hal::Pose2 pose() const { return localizer_.pose(); }
   Eigen::Matrix3d covariance() const { return localizer_.covariance(); }
+  const GnssCounts& gnss() const { return gnss_; }
 
  private:
   static constexpr int kTriesMax = 3;
@@ -55,6 +57,7 @@ class Pilot {
   hal::Clock& clock_;
   hal::Devices& devices_;
   nav::Localizer localizer_;
+  GnssCounts gnss_;
   double travelled_m_{};  // By the wheels, since the start.
 };
 

@@ -69,6 +69,13 @@ struct AreaPlan {
   std::vector<std::vector<Eigen::Vector2d>> roadmap_m;  // Polylines of the Voronoi roadmap.
 };
 
+// What the localizer made of the satellite fixes.
+struct GnssCounts {
+  std::uint64_t fixes{};
+  std::uint64_t refused{};  // Outliers, mostly multipath: the pose did not follow them.
+  std::uint64_t resets{};   // The localizer was lost and took the fixes' word.
+};
+
 // Simulation only: the run judged by the world that it could not see.
 struct Truth {
   std::uint64_t surface_visible{};  // Surface voxels visible from some reachable ground cell.
@@ -95,6 +102,7 @@ struct RunRecord {
   planning::VoxelGrid grid;
   double voxel_m{};
   int gain_min_voxels{};
+  GnssCounts gnss;
   double mission_s{};
   double driven_total_m{};
   std::string end;  // Why it ended, in words.

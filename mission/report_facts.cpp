@@ -178,51 +178,11 @@ Coverage coverage_of(const AreaPlan& plan, const AreaFacts& facts) {
   return {plan.cover.target_m, plan.cover.coverable_m, plan.cover.covered_m, facts.covered_m};
 }
 
-const Why& why_text(std::optional<Excluded> reason) {
-  static const Why kNotScanned{"not_scanned", "The station that was to cover it was not scanned.",
-                               "See the dropped stations for the reason; visit them again."};
-  static const Why kOccluded{
-      "occluded", "Hidden from every place where the scanner could stand.",
-      "Open up more ground (regions, keep-outs) or scan from a mast or the air."};
-  static const Why kRangeMax{
-      "range_max", "Farther than the scanner reaches from every place that sees it.",
-      "Raise range_max_m if the scanner allows it, or open up ground nearer to it."};
-  static const Why kRangeMin{
-      "range_min", "Closer than the scanner measures from every place that sees it.",
-      "Lower range_min_m if the scanner allows it, or let the robot stand farther off."};
-  static const Why kGrazing{
-      "grazing", "Seen only at a flatter angle than the grazing limit.",
-      "Open up ground in front of it, try more candidates, or raise grazing_max_deg."};
-  static const Why kFieldOfView{"field_of_view", "No candidate that could see it was facing it.",
-                                "Try more candidates, or widen fov_deg."};
-  static const Why kOverlap{
-      "overlap", "The stations that see it overlap the others too little to be registered.",
-      "Lower overlap_min, or try more candidates."};
-  static const Why kGain{"gain",
-                         "A station for it would add less than the smallest gain worth a scan.",
-                         "Lower gain_min to have such pieces covered too."};
-  static const Why kGoal{"goal", "The coverage goal was reached without it.",
-                         "Raise coverage_goal."};
-  if (!reason) return kNotScanned;
-  switch (*reason) {
-    case Excluded::occluded:
-      return kOccluded;
-    case Excluded::range_max:
-      return kRangeMax;
-    case Excluded::range_min:
-      return kRangeMin;
-    case Excluded::grazing:
-      return kGrazing;
-    case Excluded::field_of_view:
-      return kFieldOfView;
-    case Excluded::overlap:
-      return kOverlap;
-    case Excluded::gain:
-      return kGain;
-    case Excluded::goal:
-      return kGoal;
-  }
-  return kNotScanned;
+Why why_text(std::optional<Excluded> reason) {
+  if (reason)
+    return {planning::name(*reason), planning::meaning(*reason), planning::remedy(*reason)};
+  return {"not_scanned", "The station that was to cover it was not scanned.",
+          "See the dropped stations for the reason; visit them again."};
 }
 
 std::int64_t occupied_gained(const RunRecord& record, std::size_t scan) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "mission/record.hpp"
@@ -57,11 +58,12 @@ Eigen::Vector2d wall_point_m(const planning::Wall& wall, double along_m);
 
 // A short word for files ("range_max", "not_scanned"), what it means, and what one could do.
 struct Why {
-  std::string word;
-  std::string meaning;
-  std::string remedy;
+  std::string_view word;
+  std::string_view meaning;
+  std::string_view remedy;
 };
-const Why& why_text(std::optional<planning::Excluded> reason);
+// Without a reason: its station was not scanned.
+Why why_text(std::optional<planning::Excluded> reason);
 
 // How many voxels the scan with this index turned seen-occupied.
 std::int64_t occupied_gained(const RunRecord& record, std::size_t scan);

@@ -91,7 +91,7 @@ std::string gap_reasons(const std::vector<AreaGap>& gaps) {
   };
   std::map<std::string, Sum> sums;
   for (const AreaGap& gap : gaps) {
-    Sum& sum = sums[why_text(gap.stretch.why).word];
+    Sum& sum = sums[std::string(why_text(gap.stretch.why).word)];
     sum.length_m += gap.stretch.length_m;
     sum.longer += gap.stretch.length_m > kGapShown_m ? 1 : 0;
     sum.why = gap.stretch.why;
@@ -105,7 +105,7 @@ std::string gap_reasons(const std::vector<AreaGap>& gaps) {
                {"Pieces over 0.5 m"},
                {"What one could do", Align::text}});
   for (const Sum& sum : order) {
-    const Why& why = why_text(sum.why);
+    const Why why = why_text(sum.why);
     table.row({escaped(why.meaning), number(sum.length_m, 1), std::to_string(sum.longer),
                escaped(why.remedy)});
   }

@@ -166,6 +166,10 @@ json::object counts_json(const RunRecord& record) {
           {"by_hand", by_hand}};
 }
 
+json::object gnss_json(const GnssCounts& gnss) {
+  return {{"fixes", gnss.fixes}, {"refused", gnss.refused}, {"resets", gnss.resets}};
+}
+
 json::object sensor_json(const ScannerConfig& scanner) {
   return {{"height_m", scanner.height_m},
           {"range_min_m", scanner.range_min_m},
@@ -195,7 +199,8 @@ json::object summarise(const RunRecord& record, const ProductFacts& products) {
                        {"mission_s", mm(record.mission_s)},
                        {"driven_m", mm(record.driven_total_m)},
                        {"voxel_m", record.voxel_m},
-                       {"gain_min_voxels", record.gain_min_voxels}};
+                       {"gain_min_voxels", record.gain_min_voxels},
+                       {"gnss", gnss_json(record.gnss)}};
   summary["sensor"] = sensor_json(record.scanner);
   summary["grid"] = grid_json(record.grid);
   summary["counts"] = counts_json(record);

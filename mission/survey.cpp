@@ -106,6 +106,7 @@ hal::Task<void> Survey::run() {
     failure = std::current_exception();
   }
   record_.mission_s = now_s();
+  note_gnss();
   decide({{"t_s", now_s()},
           {"decision", "end"},
           {"completed", record_.completed},
@@ -132,6 +133,22 @@ void Survey::note_points_outside() {
     record_.notes.push_back(fmt::format(
         "{} of {} points lie outside the voxel box: raise [phase2] height_m or margin_m", outside,
         points));
+}
+
+// Fixes that the localizer would not follow, and the times when it had to.
+void Survey::note_gnss() {
+  record_.gnss = pilot_.gnss();
+  const auto& [fixes, refused, resets] = record_.gnss;
+  if (refused * 100 > fixes)
+    record_.notes.push_back(fmt::format(
+        "{} of {} satellite fixes disagreed with the localizer and were refused: expect multipath "
+        "near walls, or check the receiver's claimed accuracy",
+        refused, fixes));
+  if (resets > 0)
+    record_.notes.push_back(fmt::format(
+        "the localizer was lost {} times and started again from satellite fixes: check the scans "
+        "taken before against their neighbours",
+        resets));
 }
 
 void Survey::plan_stations() {

@@ -49,6 +49,7 @@ class Survey {
   hal::Task<void> refine();
   hal::Task<void> go_home();
   void note_points_outside();
+  void note_gnss();
 
   hal::Task<bool> visit(const Stop& stop);
   hal::Task<bool> drive(const Stop& stop, ScanRecord& scan);

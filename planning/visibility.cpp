@@ -169,26 +169,41 @@ const SensorLimits& checked(const SensorLimits& limits) {
   return limits;
 }
 
+struct Words {
+  std::string_view name, meaning, remedy;
+};
+
+const Words& words(Excluded reason) {
+  static constexpr Words kWords[] = {
+      {"occluded", "Hidden from every place where the scanner could stand.",
+       "Open up more ground (regions, keep-outs), or scan from a mast or the air."},
+      {"range_max", "Farther than the scanner reaches from every place that sees it.",
+       "Raise range_max_m if the scanner allows it, or open up ground nearer to it."},
+      {"range_min", "Closer than the scanner measures from every place that sees it.",
+       "Lower range_min_m if the scanner allows it, or open up ground farther from it."},
+      {"grazing", "Seen only at a flatter angle than the grazing limit.",
+       "Open up ground in front of it, try more candidates, or raise grazing_max_deg."},
+      {"field_of_view", "No candidate that could see it was facing it.",
+       "Try more candidates, or widen fov_deg."},
+      {"overlap", "The stations that see it overlap the others too little to be registered.",
+       "Lower overlap_min, or try more candidates."},
+      {"gain", "A station for it would add less than the smallest gain worth a scan.",
+       "Lower gain_min to have such pieces covered too."},
+      {"goal", "The coverage goal was reached without it.", "Raise coverage_goal."},
+  };
+  return kWords[static_cast<std::size_t>(reason)];
+}
+
 }  // namespace
 
 std::string_view name(Excluded reason) {
-  constexpr std::string_view kNames[] = {"occluded",      "range_max", "range_min", "grazing",
-                                         "field_of_view", "overlap",   "gain",      "goal"};
-  return kNames[static_cast<std::size_t>(reason)];
+  return words(reason).name;
 }
-
+std::string_view meaning(Excluded reason) {
+  return words(reason).meaning;
+}
 std::string_view remedy(Excluded reason) {
-  constexpr std::string_view kRemedies[] = {
-      "No station could have it in sight: open up more ground, or scan from a mast or the air.",
-      "Raise range_max_m if the scanner allows it, or open up ground nearer to it.",
-      "Lower range_min_m if the scanner allows it, or open up ground farther from it.",
-      "Open up ground in front of it, try more candidates, or raise grazing_max_deg.",
-      "Try more candidates, or widen fov_deg.",
-      "Lower overlap_min, or try more candidates.",
-      "Lower gain_min to have such pieces covered too.",
-      "Raise coverage_goal.",
-  };
-  return kRemedies[static_cast<std::size_t>(reason)];
+  return words(reason).remedy;
 }
 
 Visibility::Visibility(const std::vector<Wall>& walls, const SensorLimits& limits)

@@ -235,10 +235,10 @@ TEST(ReportFacts, EveryReasonHasItsOwnWordMeaningAndRemedy) {
       {Excluded::gain, "gain"},           {Excluded::goal, "goal"}};
   std::set<std::string> meanings;
   for (const auto& [reason, word] : words) {
-    const Why& why = why_text(reason);
+    const Why why = why_text(reason);
     EXPECT_EQ(why.word, word);
     EXPECT_FALSE(why.remedy.empty());
-    meanings.insert(why.meaning);
+    meanings.emplace(why.meaning);
   }
   EXPECT_EQ(meanings.size(), 8U);
   EXPECT_EQ(why_text(std::nullopt).word, "not_scanned");

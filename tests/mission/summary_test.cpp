@@ -85,6 +85,13 @@ TEST(Summary, GivesTheMapsOffsetAndNullWhereNothingIsKnown) {
   EXPECT_TRUE(summary.at_pointer("/coverage/covered_of_target").is_null());
 }
 
+TEST(Summary, TellsWhatBecameOfTheSatelliteFixes) {
+  RunRecord run = test::sample_record();
+  run.gnss = {.fixes = 1500, .refused = 40, .resets = 1};
+  EXPECT_EQ(json::value(summarise(run, {})).at("gnss"),
+            json::value({{"fixes", 1500U}, {"refused", 40U}, {"resets", 1U}}));
+}
+
 TEST(Summary, TheSameRunGivesTheSameBytes) {
   EXPECT_EQ(json_pretty(summarise(test::sample_record(), {})),
             json_pretty(summarise(test::sample_record(), {})));
