@@ -64,10 +64,13 @@ struct Phase1Config {
 // [phase2]
 struct Phase2Config {
   double voxel_m = 1.0;
-  double height_m = 30.0;  // Of the voxel box above the lowest ground.
+  double height_m = 30.0;       // Of the voxel box above the lowest ground, at first.
+  double height_max_m = 120.0;  // The box grows up to here when scans see higher.
   int gain_min_voxels = 100;
   int views_max = 100;
   bool carve_no_return = true;
+  bool foliage = false;  // Tell thin vegetation from walls (planning/voxel_foliage.hpp).
+  double foliage_share_min = 0.8;
 };
 
 // Where a key was written. Line and column count from 1; 0 says "the whole file" (or no file).

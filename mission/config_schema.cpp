@@ -80,13 +80,21 @@ SectionSpec phase2_section() {
           "Next best views in the voxel map (Algorithm 2).",
           {keys.number("voxel_m", &P::voxel_m, 0.02, 20, "m", "Edge of a voxel"),
            keys.number("height_m", &P::height_m, 0.5, 500, "m",
-                       "Of the voxel box above the lowest ground"),
+                       "Of the voxel box above the lowest ground, at first"),
+           keys.number("height_max_m", &P::height_max_m, 0, 500, "m",
+                       "The box grows up to this height when scans see higher than it; "
+                       "`height_m` or less: it never grows"),
            keys.number("gain_min_voxels", &P::gain_min_voxels, 1, 1e9, "voxels",
                        "Stop when no view would see this many boundary unseen voxels"),
            keys.number("views_max", &P::views_max, 0, 100'000, "",
                        "At most this many next best views; 0: Phase I only"),
            keys.other("carve_no_return", &P::carve_no_return,
-                      "Beams that hit nothing show empty space up to the maximum range")},
+                      "Beams that hit nothing show empty space up to the maximum range"),
+           keys.other("foliage", &P::foliage,
+                      "Views look through seen-occupied voxels that most beams pass, such as "
+                      "thin vegetation"),
+           keys.number("foliage_share_min", &P::foliage_share_min, 0.5, 1, "share",
+                       "Of the beams into such a voxel that must have passed it")},
           {}};
 }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
+#include <span>
 
 #include "nav/polygons.hpp"
 
@@ -42,11 +44,20 @@ planning::ViewLimits view_limits(const ScannerConfig& scanner) {
           .grazing_max_deg = scanner.grazing_max_deg};
 }
 
-std::size_t index_of(const planning::VoxelGrid& grid, const planning::Voxel& v) {
-  return (static_cast<std::size_t>(v.z) * static_cast<std::size_t>(grid.ny) +
-          static_cast<std::size_t>(v.y)) *
-             static_cast<std::size_t>(grid.nx) +
-         static_cast<std::size_t>(v.x);
+// Layers that the map has to keep, so that the box can grow: as high as scans can see from the
+// highest ground, at most height_max_m above the lowest, and no more than the largest box has
+// voxels (check.cpp).
+int layers_kept(const MissionConfig& config, const planning::VoxelGrid& grid,
+                const std::vector<AreaTask>& tasks) {
+  constexpr double kVoxelsMax = 400e6;
+  const double ground_low_m = grid.W_min_m.z() + kGroundInLayer * grid.voxel_m;
+  double ground_high_m = ground_low_m;
+  for (const AreaTask& task : tasks) ground_high_m = std::max(ground_high_m, task.area.ground_z_m);
+  const ScannerConfig& scanner = config.robot.scanner;
+  const double sight_m = ground_high_m - ground_low_m + scanner.height_m + scanner.range_max_m;
+  const double layers = std::ceil(std::min(config.phase2.height_max_m, sight_m) / grid.voxel_m) + 1;
+  const double most = kVoxelsMax / (static_cast<double>(grid.nx) * grid.ny);
+  return std::max(static_cast<int>(std::min(layers, most)), grid.nz);
 }
 
 }  // namespace
@@ -77,13 +88,14 @@ SiteModel::SiteModel(const MissionConfig& config, const nav::SiteMap& map,
     : config_(config),
       tasks_(std::move(tasks)),
       threads_(threads),
-      map_(voxel_grid(config, map, tasks_)) {
+      map_(voxel_grid(config, map, tasks_),
+           layers_kept(config, voxel_grid(config, map, tasks_), tasks_)) {
+  if (config_.phase2.foliage) beams_.emplace(map_);
   find_cells();
   const planning::VoxelGrid& grid = map_.grid();
   const nav::RasterGrid columns{grid.W_min_m.head<2>(), grid.voxel_m, grid.nx, grid.ny};
   in_site_ = nav::rasterize(map.boundary, columns);
   find_ground(columns);
-  tries_.assign(grid.size(), 0);
   excluded_.assign(cells_.size(), 0);
   obstacle_grid_ = {grid.W_min_m.head<2>(), kObstacleCellM,
                     static_cast<int>(std::ceil(grid.nx * grid.voxel_m / kObstacleCellM)),
@@ -158,16 +170,62 @@ ScanEffect SiteModel::add(const hal::ScanCloud& scan,
   insert.ground_z_m = ground_z_m;
   insert.threads = threads_;
   const planning::InsertReport report = map_.insert(scan, T_W_S, insert);
+  if (beams_) beams_->add(scan, T_W_S, insert);
   restore_ground();
-  find_boundary();
-
   ScanEffect effect;
-  effect.points_outside_box = report.returns_outside;
+  effect.layers_added = grow(report);
+  const auto new_layers =
+      std::span(report.returns_above)
+          .first(std::min<std::size_t>(report.returns_above.size(),
+                                       static_cast<std::size_t>(effect.layers_added)));
+  effect.points_outside_box =
+      report.returns_outside - std::accumulate(new_layers.begin(), new_layers.end(), 0ULL);
+  find_boundary();
+  look_through();
   const Eigen::Vector3f W_scanner_m = T_W_S.translation().cast<float>();
   for (const Eigen::Vector3f& W_point_m : W_points_m)
     if ((W_point_m - W_scanner_m).squaredNorm() < kObstacleRangeMaxM * kObstacleRangeMaxM)
       note_obstacle(W_point_m, ground_z_m, effect);
   return effect;
+}
+
+// How many layers were added to the box: up to the highest one that is kept and has enough returns
+// in it and above, so that a stray return adds none.
+int SiteModel::grow(const planning::InsertReport& report) {
+  const auto before = static_cast<std::size_t>(map_.grid().nz);
+  points_outside_ += report.returns_outside;
+  returns_above_.resize(std::max(returns_above_.size(), before + report.returns_above.size()));
+  for (std::size_t i = 0; i < report.returns_above.size(); ++i)
+    returns_above_[before + i] += report.returns_above[i];
+
+  std::size_t nz = std::min(returns_above_.size(), static_cast<std::size_t>(map_.nz_kept()));
+  std::uint64_t in_or_above = 0;
+  for (; nz > before; --nz)
+    if ((in_or_above += returns_above_[nz - 1]) >= kReturnsToGrow) break;
+  if (nz <= before) return 0;
+  for (std::size_t z = before; z < nz; ++z) points_outside_ -= returns_above_[z];
+  map_.grow_z(static_cast<int>(nz));
+  return static_cast<int>(nz - before);
+}
+
+std::uint64_t SiteModel::points_above_box() const {
+  std::uint64_t sum = 0;
+  for (auto z = static_cast<std::size_t>(map_.grid().nz); z < returns_above_.size(); ++z)
+    sum += returns_above_[z];
+  return sum;
+}
+
+// Known ground stays ground: beams that skim it pass its voxels by the hundred.
+void SiteModel::look_through() {
+  if (!beams_) return;
+  see_through_ =
+      planning::see_through(map_, *beams_, {.share_min = config_.phase2.foliage_share_min});
+  for (const planning::Voxel& v : ground_) see_through_->set(v, map_.at(v));
+}
+
+std::size_t SiteModel::voxel_bytes() const {
+  return map_.storage_bytes() + (beams_ ? beams_->storage_bytes() : 0) +
+         (see_through_ ? see_through_->storage_bytes() : 0);
 }
 
 void SiteModel::note_obstacle(const Eigen::Vector3f& W_point_m, double ground_z_m,
@@ -188,8 +246,10 @@ void SiteModel::note_obstacle(const Eigen::Vector3f& W_point_m, double ground_z_
 std::vector<planning::BoundaryVoxel> SiteModel::worth_seeing() const {
   std::vector<planning::BoundaryVoxel> worth;
   worth.reserve(boundary_.size());
-  for (const planning::BoundaryVoxel& u : boundary_)
-    if (tries_[index_of(map_.grid(), u.v)] < kTriesMax) worth.push_back(u);
+  for (const planning::BoundaryVoxel& u : boundary_) {
+    const auto tries = tries_.find(u.v);
+    if (tries == tries_.end() || tries->second < kTriesMax) worth.push_back(u);
+  }
   return worth;
 }
 
@@ -197,12 +257,13 @@ std::vector<NextView> SiteModel::next_views() {
   std::vector<std::size_t> open;  // Indices of cells that may be asked for.
   std::vector<planning::Voxel> candidates;
   for (std::size_t i = 0; i < cells_.size(); ++i) {
-    if (excluded_[i] || map_.at(cells_[i].voxel) != planning::VoxelState::seen_empty) continue;
+    if (excluded_[i] || planner_map().at(cells_[i].voxel) != planning::VoxelState::seen_empty)
+      continue;
     open.push_back(i);
     candidates.push_back(cells_[i].voxel);
   }
   const std::vector<std::uint32_t> counts = planning::tally(
-      map_, worth_seeing(), candidates, view_limits(config_.robot.scanner), threads_);
+      planner_map(), worth_seeing(), candidates, view_limits(config_.robot.scanner), threads_);
 
   best_voxels_ = 0;
   std::vector<NextView> views;
@@ -223,8 +284,8 @@ std::vector<NextView> SiteModel::next_views() {
 void SiteModel::expect(const NextView& view) {
   const auto worth = worth_seeing();
   expected_.clear();
-  for (const std::uint32_t i :
-       planning::visible_from(map_, worth, view.cell.voxel, view_limits(config_.robot.scanner)))
+  for (const std::uint32_t i : planning::visible_from(planner_map(), worth, view.cell.voxel,
+                                                      view_limits(config_.robot.scanner)))
     expected_.push_back(worth[i].v);
 }
 
@@ -233,7 +294,7 @@ std::uint64_t SiteModel::settle() {
   for (const planning::Voxel& v : expected_) {
     if (map_.at(v) != planning::VoxelState::unseen) {
       ++resolved;
-    } else if (++tries_[index_of(map_.grid(), v)] == kTriesMax) {
+    } else if (++tries_[v] == kTriesMax) {
       ++set_aside_;
     }
   }

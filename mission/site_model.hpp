@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "mission/record.hpp"
 #include "nav/raster.hpp"
 #include "planning/next_best_view.hpp"
+#include "planning/voxel_foliage.hpp"
 #include "planning/voxel_map.hpp"
 
 namespace mission {
@@ -37,7 +39,8 @@ struct NextView {
 
 // What one scan did to the model.
 struct ScanEffect {
-  std::uint64_t points_outside_box{};
+  std::uint64_t points_outside_box{};  // After the box has grown.
+  int layers_added{};                  // To the box, because scans saw higher.
   std::vector<Eigen::Vector2d>
       new_obstacles_m;  // Centres of 0.25 m cells that the map has as free.
 };
@@ -70,7 +73,18 @@ class SiteModel {
   void exclude(const planning::Voxel& cell);
 
   VoxelCounts counts() const;
+  // Grows in z when at least kReturnsToGrow points lie in a layer above the box or higher, up to
+  // [phase2] height_max_m. What is then in it, and everything derived from it, is as if the box had
+  // been this high from the start.
   const planning::VoxelMap& map() const { return map_; }
+  static constexpr std::uint64_t kReturnsToGrow = 10;
+  // Of all scans, with the box as it is now.
+  std::uint64_t points_outside_box() const { return points_outside_; }
+  std::uint64_t points_above_box() const;
+  // The map as views look through it: without foliage, if that is asked for.
+  const planning::VoxelMap& planner_map() const { return see_through_ ? *see_through_ : map_; }
+  // Of everything kept per voxel.
+  std::size_t voxel_bytes() const;
   const std::vector<ViewCell>& cells() const { return cells_; }
   Eigen::Vector3d cell_position_m(const ViewCell& cell) const;
 
@@ -80,6 +94,8 @@ class SiteModel {
   void find_cells();
   void find_ground(const nav::RasterGrid& columns);
   void restore_ground();
+  int grow(const planning::InsertReport& report);
+  void look_through();
   void find_boundary();
   std::vector<planning::BoundaryVoxel> worth_seeing() const;
   void note_obstacle(const Eigen::Vector3f& W_point_m, double ground_z_m, ScanEffect& effect);
@@ -92,8 +108,12 @@ class SiteModel {
   std::vector<std::uint8_t> in_site_;              // Per column of voxels.
   std::vector<planning::Voxel> ground_;            // Hold the mapped ground; never seen-empty.
   std::vector<ViewCell> cells_;
-  std::vector<std::uint8_t> tries_;     // Per voxel.
-  std::vector<std::uint8_t> excluded_;  // Per cells_ index.
+  std::map<planning::Voxel, int> tries_;      // Of those that a view did not resolve.
+  std::vector<std::uint8_t> excluded_;        // Per cells_ index.
+  std::vector<std::uint64_t> returns_above_;  // [z]: of all scans, above the box at first.
+  std::uint64_t points_outside_{};
+  std::optional<planning::BeamCounts> beams_;      // Only for [phase2] foliage.
+  std::optional<planning::VoxelMap> see_through_;  // The same.
   std::vector<planning::Voxel> expected_;
   std::uint64_t best_voxels_{};
   std::uint64_t set_aside_{};

@@ -90,6 +90,7 @@ Survey::Survey(const MissionConfig& config, const nav::SiteMap& map, SiteTasks t
   record_.notes = tasks_.notes;
   record_.scanner = config.robot.scanner;
   record_.grid = model_.map().grid();
+  layers_at_first_ = record_.grid.nz;
   record_.voxel_m = config.phase2.voxel_m;
   record_.gain_min_voxels = config.phase2.gain_min_voxels;
 }
@@ -118,21 +119,29 @@ hal::Task<void> Survey::survey() {
   for (std::size_t t = 0; t < record_.plans.size(); ++t) co_await tour(t);
   co_await refine();
   co_await go_home();
-  note_points_outside();
+  note_box();
   record_.completed = true;
 }
 
 // A box that is too low hides what the scans saw above it: the operator has to know.
-void Survey::note_points_outside() {
-  std::uint64_t points = 0, outside = 0;
-  for (const ScanRecord& scan : record_.scans) {
-    points += scan.points;
-    outside += scan.points_outside_box;
-  }
+void Survey::note_box() {
+  const planning::VoxelGrid& grid = model_.map().grid();
+  if (grid.nz > layers_at_first_)
+    record_.notes.push_back(
+        fmt::format("scans saw higher than the voxel box: it grew from {} to {} layers of {} m",
+                    layers_at_first_, grid.nz, grid.voxel_m));
+  if (const std::uint64_t above = model_.points_above_box(); above > 0)
+    record_.notes.push_back(fmt::format(
+        "{} points above the voxel box were left out: it grows for {} points in a layer or above, "
+        "up to [phase2] height_max_m = {} m",
+        above, SiteModel::kReturnsToGrow, config_.phase2.height_max_m));
+  std::uint64_t points = 0;
+  for (const ScanRecord& scan : record_.scans) points += scan.points;
+  const std::uint64_t outside = model_.points_outside_box();
   if (outside * 1000 > points)
     record_.notes.push_back(fmt::format(
-        "{} of {} points lie outside the voxel box: raise [phase2] height_m or margin_m", outside,
-        points));
+        "{} of {} points lie outside the voxel box: raise [phase2] height_max_m or margin_m",
+        outside, points));
 }
 
 // Fixes that the localizer would not follow, and the times when it had to.
@@ -323,6 +332,7 @@ void Survey::merge(const hal::ScanCloud& cloud, const Stop& stop, ScanRecord& sc
   scan.points = W_points_m.size();
   scan.points_outside_box = effect.points_outside_box;
   scan.after = model_.counts();
+  record_.grid = model_.map().grid();  // May have grown.
   close_roads(effect.new_obstacles_m);
   decide({{"t_s", now_s()},
           {"decision", "scan"},
@@ -337,7 +347,8 @@ void Survey::merge(const hal::ScanCloud& cloud, const Stop& stop, ScanRecord& sc
           {"boundary_unseen", scan.after.boundary_unseen},
           {"predicted_voxels", scan.predicted_voxels},
           {"resolved_voxels", scan.resolved_voxels},
-          {"new_obstacle_cells", effect.new_obstacles_m.size()}});
+          {"new_obstacle_cells", effect.new_obstacles_m.size()},
+          {"box_layers_added", effect.layers_added}});
   record_.scans.push_back(std::move(scan));
 }
 

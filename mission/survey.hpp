@@ -48,7 +48,7 @@ class Survey {
   hal::Task<void> tour(std::size_t task);
   hal::Task<void> refine();
   hal::Task<void> go_home();
-  void note_points_outside();
+  void note_box();
   void note_gnss();
 
   hal::Task<bool> visit(const Stop& stop);
@@ -72,6 +72,7 @@ class Survey {
   Parts parts_;
   Pilot pilot_;
   SiteModel model_;
+  int layers_at_first_{};     // Of its voxel box.
   std::vector<Roads> roads_;  // One per planned task, in order.
   std::size_t stations_planned_{};
   std::size_t stations_done_{};

@@ -25,9 +25,9 @@ std::uint64_t inside(int word, int nx) {
   return left >= 64 ? ~std::uint64_t{0} : bit(left) - 1;
 }
 
-std::size_t count(const Bits& bits) {
+std::size_t count(const Bits& bits, std::size_t words) {
   std::size_t sum = 0;
-  for (const std::uint64_t word : bits) sum += static_cast<std::size_t>(std::popcount(word));
+  for (std::size_t i = 0; i < words; ++i) sum += static_cast<std::size_t>(std::popcount(bits[i]));
   return sum;
 }
 
@@ -49,14 +49,22 @@ void check(const VoxelGrid& grid) {
 struct Marks {
   Bits bits;
   std::size_t outside{};
-  int layers_needed{};
+  std::vector<std::uint64_t> above;  // See InsertReport::returns_above.
+
+  void add(const Marks& other) {
+    for (std::size_t word = 0; word < bits.size(); ++word) bits[word] |= other.bits[word];
+    outside += other.outside;
+    above.resize(std::max(above.size(), other.above.size()));
+    for (std::size_t i = 0; i < other.above.size(); ++i) above[i] += other.above[i];
+  }
 };
 
 class ReturnMarker {
  public:
-  ReturnMarker(const VoxelGrid& grid, int row_words, const hal::ScanCloud& scan, const BeamFan& fan,
-               const std::vector<float>& reach_m)
-      : grid_(grid), row_words_(row_words), scan_(scan), fan_(fan), reach_m_(reach_m) {}
+  // `kept` is the box with the layers kept above its nz.
+  ReturnMarker(const VoxelGrid& kept, int nz, int row_words, const hal::ScanCloud& scan,
+               const BeamFan& fan, const std::vector<float>& reach_m)
+      : kept_(kept), nz_(nz), row_words_(row_words), scan_(scan), fan_(fan), reach_m_(reach_m) {}
 
   void mark(std::uint32_t column, Marks& marks) const {
     const std::uint32_t rows = scan_.pattern.rows;
@@ -69,48 +77,62 @@ class ReturnMarker {
 
  private:
   void mark(Voxel v, Marks& marks) const {
-    if (grid_.contains(v)) {
-      const std::size_t row = static_cast<std::size_t>(v.z) * static_cast<std::size_t>(grid_.ny) +
+    if (kept_.contains(v)) {
+      const std::size_t row = static_cast<std::size_t>(v.z) * static_cast<std::size_t>(kept_.ny) +
                               static_cast<std::size_t>(v.y);
       marks.bits[row * static_cast<std::size_t>(row_words_) + static_cast<std::size_t>(v.x >> 6)] |=
           bit(v.x);
-      return;
+      if (v.z < nz_) return;
     }
     ++marks.outside;
-    if (grid_.contains({v.x, v.y, 0})) marks.layers_needed = std::max(marks.layers_needed, v.z + 1);
+    if (v.z < nz_ || !kept_.contains({v.x, v.y, 0})) return;
+    const auto layer = static_cast<std::size_t>(v.z - nz_);
+    if (layer >= marks.above.size()) marks.above.resize(layer + 1);
+    ++marks.above[layer];
   }
 
-  const VoxelGrid& grid_;
+  const VoxelGrid& kept_;
+  int nz_;
   int row_words_;
   const hal::ScanCloud& scan_;
   const BeamFan& fan_;
   const std::vector<float>& reach_m_;
 };
 
-Marks mark_returns(const ReturnMarker& marker, std::uint32_t columns, const Bits& occupied,
-                   int layers, int threads) {
+Marks mark_returns(const ReturnMarker& marker, std::uint32_t columns, std::size_t words,
+                   int threads) {
   std::vector<Marks> parts(static_cast<std::size_t>(std::max(threads, 1)));
-  for (Marks& part : parts) part = {Bits(occupied.size()), 0, layers};
+  for (Marks& part : parts) part.bits.resize(words);
   for_pieces(threads, columns, 16, [&](int thread, std::size_t begin, std::size_t end) {
     for (auto column = static_cast<std::uint32_t>(begin); column < end; ++column)
       marker.mark(column, parts[static_cast<std::size_t>(thread)]);
   });
-  Marks& sum = parts.front();
-  for (std::size_t i = 1; i < parts.size(); ++i) {
-    for (std::size_t word = 0; word < sum.bits.size(); ++word)
-      sum.bits[word] |= parts[i].bits[word];
-    sum.outside += parts[i].outside;
-    sum.layers_needed = std::max(sum.layers_needed, parts[i].layers_needed);
-  }
-  return std::move(sum);
+  for (std::size_t i = 1; i < parts.size(); ++i) parts.front().add(parts[i]);
+  return std::move(parts.front());
 }
 
 }  // namespace
 
-VoxelMap::VoxelMap(const VoxelGrid& grid) : grid_(grid), row_words_((grid.nx + 63) / 64) {
+VoxelMap::VoxelMap(const VoxelGrid& grid, int nz_kept)
+    : grid_(grid), row_words_((grid.nx + 63) / 64), nz_kept_(std::max(nz_kept, grid.nz)) {
   check(grid);
-  occupied_.resize(row_begin(0, grid.nz));
+  check(kept_grid());
+  occupied_.resize(row_begin(0, nz_kept_));
   empty_.resize(occupied_.size());
+}
+
+VoxelGrid VoxelMap::kept_grid() const {
+  VoxelGrid kept = grid_;
+  kept.nz = nz_kept_;
+  return kept;
+}
+
+bool VoxelMap::operator==(const VoxelMap& other) const {
+  const auto same = [&](const Bits& a, const Bits& b) {
+    return std::equal(a.begin(), a.begin() + static_cast<std::ptrdiff_t>(box_words()), b.begin());
+  };
+  return grid_.nx == other.grid_.nx && grid_.ny == other.grid_.ny && grid_.nz == other.grid_.nz &&
+         same(occupied_, other.occupied_) && same(empty_, other.empty_);
 }
 
 VoxelState VoxelMap::at(Voxel v) const {
@@ -121,17 +143,24 @@ VoxelState VoxelMap::at(Voxel v) const {
 }
 
 VoxelCounts VoxelMap::counts() const {
-  const std::size_t occupied = count(occupied_), empty = count(empty_);
+  const std::size_t occupied = count(occupied_, box_words()), empty = count(empty_, box_words());
   return {grid_.size() - occupied - empty, empty, occupied};
 }
 
-void VoxelMap::set(Voxel v, VoxelState state) {
-  if (!grid_.contains(v)) throw std::out_of_range("VoxelMap::set: voxel outside the box");
-  const std::size_t word = row_begin(v.y, v.z) + static_cast<std::size_t>(v.x >> 6);
-  occupied_[word] &= ~bit(v.x);
-  empty_[word] &= ~bit(v.x);
-  if (state == VoxelState::seen_occupied) occupied_[word] |= bit(v.x);
-  if (state == VoxelState::seen_empty) empty_[word] |= bit(v.x);
+void VoxelMap::set_run(Voxel v, int count, VoxelState state) {
+  if (count < 1) return;
+  if (!grid_.contains(v) || count > grid_.nx - v.x)
+    throw std::out_of_range("VoxelMap::set_run: voxels outside the box");
+  const int end = v.x + count;
+  for (int word = v.x >> 6; word <= (end - 1) >> 6; ++word) {
+    const std::size_t i = row_begin(v.y, v.z) + static_cast<std::size_t>(word);
+    const int before = std::max(v.x - 64 * word, 0);
+    const std::uint64_t run = inside(word, end) & (~std::uint64_t{0} << before);
+    occupied_[i] &= ~run;
+    empty_[i] &= ~run;
+    if (state == VoxelState::seen_occupied) occupied_[i] |= run;
+    if (state == VoxelState::seen_empty) empty_[i] |= run;
+  }
 }
 
 void VoxelMap::grow_z(int nz) {
@@ -142,32 +171,41 @@ void VoxelMap::grow_z(int nz) {
     throw std::invalid_argument("grow_z: " + std::to_string(nz) + " layers are fewer than " +
                                 std::to_string(grid_.nz));
   grid_ = grown;
+  if (nz <= nz_kept_) return;
+  nz_kept_ = nz;
   occupied_.resize(row_begin(0, nz));
   empty_.resize(occupied_.size());
 }
 
 InsertReport VoxelMap::insert(const hal::ScanCloud& scan, const Eigen::Isometry3d& T_W_S,
                               const InsertConfig& config) {
-  const BeamFan fan(grid_, scan.pattern, T_W_S);
-  const BeamReach reach = beam_reach(scan, grid_, T_W_S, fan, config);
+  const VoxelGrid kept = kept_grid();
+  const BeamFan fan(kept, scan.pattern, T_W_S);
+  const BeamReach reach = beam_reach(scan, kept, T_W_S, fan, config);
   InsertReport report = reach.counted;
 
-  const ReturnMarker marker(grid_, row_words_, scan, fan, reach.reach_m);
-  const Marks marks =
-      mark_returns(marker, scan.pattern.columns, occupied_, grid_.nz, config.threads);
+  const ReturnMarker marker(kept, grid_.nz, row_words_, scan, fan, reach.reach_m);
+  Marks marks = mark_returns(marker, scan.pattern.columns, occupied_.size(), config.threads);
   report.returns_outside = marks.outside;
-  report.layers_needed = marks.layers_needed;
-  const std::size_t occupied_before = count(occupied_), empty_before = count(empty_);
+  report.layers_needed = grid_.nz + static_cast<int>(marks.above.size());
+  report.returns_above = std::move(marks.above);
+  const VoxelCounts before = counts();
   for (std::size_t word = 0; word < occupied_.size(); ++word) {
     occupied_[word] |= marks.bits[word];
     empty_[word] &= ~marks.bits[word];
   }
-  report.new_occupied = count(occupied_) - occupied_before;
-  report.emptied_to_occupied = empty_before - count(empty_);
+  const VoxelCounts marked = counts();
+  report.new_occupied = marked.seen_occupied - before.seen_occupied;
+  report.emptied_to_occupied = before.seen_empty - marked.seen_empty;
 
-  const BeamCarver carver(grid_, scan.pattern, T_W_S, fan, reach.reach_m, config.threads);
-  const auto rows = static_cast<std::size_t>(grid_.ny) * static_cast<std::size_t>(grid_.nz);
-  for_pieces(config.threads, rows, 32, [&](int, std::size_t begin, std::size_t end) {
+  carve({kept, scan.pattern, T_W_S, fan, reach.reach_m, config.threads}, config.threads);
+  report.new_empty = counts().seen_empty - marked.seen_empty;
+  return report;
+}
+
+void VoxelMap::carve(const BeamCarver& carver, int threads) {
+  const auto rows = static_cast<std::size_t>(grid_.ny) * static_cast<std::size_t>(nz_kept_);
+  for_pieces(threads, rows, 32, [&](int, std::size_t begin, std::size_t end) {
     for (std::size_t row = begin; row < end; ++row) {
       const int y = static_cast<int>(row) % grid_.ny, z = static_cast<int>(row) / grid_.ny;
       const BeamCarver::Words words = carver.reachable_words(y, z);
@@ -178,8 +216,6 @@ InsertReport VoxelMap::insert(const hal::ScanCloud& scan, const Eigen::Isometry3
       }
     }
   });
-  report.new_empty = count(empty_) - (empty_before - report.emptied_to_occupied);
-  return report;
 }
 
 std::vector<BoundaryVoxel> boundary_unseen(const VoxelMap& map) {

@@ -12,6 +12,8 @@
 
 namespace planning {
 
+class BeamCarver;
+
 enum class VoxelState : std::uint8_t { unseen, seen_empty, seen_occupied };
 
 struct Voxel {
@@ -70,14 +72,16 @@ struct InsertConfig {
 
 // What one scan did.
 struct InsertReport {
-  std::size_t returns{};              // Within range.
-  std::size_t returns_outside{};      // Of these, with the point outside the box.
-  std::size_t returns_too_near{};     // Below range_min_m: ignored.
-  std::size_t returns_too_far{};      // Above range_max_m: ignored.
-  std::size_t returns_invalid{};      // Negative or not a number: ignored.
-  std::size_t no_returns{};           // Beams from which nothing came back.
-  std::size_t no_returns_carved{};    // Of these, carved at least part of the way.
-  int layers_needed{};                // nz with which no return lies above the box (see grow_z).
+  std::size_t returns{};            // Within range.
+  std::size_t returns_outside{};    // Of these, with the point outside the box.
+  std::size_t returns_too_near{};   // Below range_min_m: ignored.
+  std::size_t returns_too_far{};    // Above range_max_m: ignored.
+  std::size_t returns_invalid{};    // Negative or not a number: ignored.
+  std::size_t no_returns{};         // Beams from which nothing came back.
+  std::size_t no_returns_carved{};  // Of these, carved at least part of the way.
+  int layers_needed{};              // nz with which no return lies above the box (see grow_z).
+  // [i]: returns above the box, in its columns, in layer nz + i. Ends with the highest of them.
+  std::vector<std::uint64_t> returns_above;
   std::size_t new_occupied{};         // Voxels that became seen-occupied,
   std::size_t emptied_to_occupied{};  // of these, seen-empty before.
   std::size_t new_empty{};            // Voxels that became seen-empty.
@@ -88,8 +92,10 @@ struct InsertReport {
 // Two bits per voxel. Rows run along x and are padded to 64 bits, padding 0.
 class VoxelMap {
  public:
-  // All unseen. Throws std::invalid_argument for a box without voxels or beyond 2^17 per axis.
-  explicit VoxelMap(const VoxelGrid& grid);
+  // All unseen. The states of layers up to nz_kept are kept from the start although the box does
+  // not show them, so that grow_z() up to there gives what the higher box would have given.
+  // Throws std::invalid_argument for a box without voxels or beyond 2^17 per axis.
+  explicit VoxelMap(const VoxelGrid& grid, int nz_kept = 0);
 
   const VoxelGrid& grid() const { return grid_; }
   // Outside the box: unseen.
@@ -106,21 +112,29 @@ class VoxelMap {
   InsertReport insert(const hal::ScanCloud& scan, const Eigen::Isometry3d& T_W_S,
                       const InsertConfig& config);
 
-  // More layers on top, all unseen; the states below are kept. After a scan that saw higher than
-  // the box, grow_z(report.layers_needed) and insert() of the same scan again give what the higher
-  // box would have given. Throws std::invalid_argument when nz is less than now.
+  // A higher box. Layers that were kept show what all scans saw there, as if the box had been this
+  // high from the start; those above are unseen until a scan is inserted. Throws
+  // std::invalid_argument when nz is less than now.
   void grow_z(int nz);
+  int nz_kept() const { return nz_kept_; }  // At least grid().nz.
 
   // For maps that come from elsewhere (files, tests). v must be inside the box.
-  void set(Voxel v, VoxelState state);
+  void set(Voxel v, VoxelState state) { set_run(v, 1, state); }
+  // The same for `count` voxels from v on along x.
+  void set_run(Voxel v, int count, VoxelState state);
+
+  // Of the states, kept layers included: 2 bits a voxel and the padding of rows, so at most a byte
+  // per voxel from nx = 16 on (a quarter of one where nx is a multiple of 64).
+  std::size_t storage_bytes() const {
+    return (occupied_.capacity() + empty_.capacity()) * sizeof(std::uint64_t);
+  }
 
   int row_words() const { return row_words_; }
   std::span<const std::uint64_t> occupied_row(int y, int z) const { return row(occupied_, y, z); }
   std::span<const std::uint64_t> empty_row(int y, int z) const { return row(empty_, y, z); }
 
-  bool operator==(const VoxelMap& other) const {
-    return occupied_ == other.occupied_ && empty_ == other.empty_;
-  }
+  // The same box of voxels in the same states; what is kept above it does not count.
+  bool operator==(const VoxelMap& other) const;
 
  private:
   std::span<const std::uint64_t> row(const std::vector<std::uint64_t>& bits, int y, int z) const {
@@ -132,8 +146,14 @@ class VoxelMap {
            static_cast<std::size_t>(row_words_);
   }
 
+  // How many words the layers of the box take; kept layers come after.
+  std::size_t box_words() const { return row_begin(0, grid_.nz); }
+  VoxelGrid kept_grid() const;
+  void carve(const BeamCarver& carver, int threads);
+
   VoxelGrid grid_;
   int row_words_{};
+  int nz_kept_{};
   std::vector<std::uint64_t> occupied_;
   std::vector<std::uint64_t> empty_;  // Never both.
 };

@@ -2,11 +2,11 @@
 
 #include <gtest/gtest.h>
 
-#include <limits>
 #include <set>
 
 #include "planning/voxel_beams.hpp"
 #include "tests/planning/voxel_oracle.hpp"
+#include "tests/planning/voxel_scans.hpp"
 #include "tests/planning/voxel_worlds.hpp"
 
 namespace {
@@ -19,8 +19,13 @@ using planning::Voxel;
 using planning::VoxelGrid;
 using planning::VoxelMap;
 using planning::VoxelState;
+using worlds::beam;
 using worlds::kDegree;
+using worlds::literal;
 using worlds::Random;
+using worlds::random_pose;
+using worlds::random_scan;
+using worlds::RandomScan;
 using worlds::uniform;
 using worlds::uniform_int;
 
@@ -41,111 +46,6 @@ void expect_same(const VoxelMap& fast, const VoxelMap& slow, const std::string& 
                         << static_cast<int>(slow.at({x, y, z}));
   ASSERT_GT(told, 0) << what << ": padding bits differ";
   ADD_FAILURE() << what << ": " << told << " voxels differ";
-}
-
-// One beam along +x of S with the given range.
-hal::ScanCloud beam(float range_m, double elevation_rad = 0) {
-  hal::ScanCloud scan;
-  scan.pattern.columns = scan.pattern.rows = 1;
-  scan.pattern.elevation_first_rad = elevation_rad;
-  scan.ranges_m = {range_m};
-  return scan;
-}
-
-InsertConfig literal(double range_max_m = 100) {
-  InsertConfig config;
-  config.range_min_m = 0;
-  config.range_max_m = range_max_m;
-  config.no_return_window = 0;
-  return config;
-}
-
-// A pattern, ranges and pose of any kind that a scanner could have, and worse.
-struct RandomScan {
-  VoxelGrid grid;
-  hal::ScanCloud scan;
-  Eigen::Isometry3d T_W_S = Eigen::Isometry3d::Identity();
-  InsertConfig config;
-};
-
-hal::ScanPattern random_pattern(Random& random) {
-  hal::ScanPattern pattern;
-  pattern.columns = static_cast<std::uint32_t>(uniform_int(random, 1, 90));
-  pattern.rows = static_cast<std::uint32_t>(uniform_int(random, 1, 60));
-  pattern.azimuth_first_rad = uniform(random, -7, 7);
-  pattern.elevation_first_rad = uniform(random, -1.6, 0.5);
-  const double sign = uniform_int(random, 0, 1) != 0 ? 1 : -1;
-  switch (uniform_int(random, 0, 3)) {
-    case 0:
-      pattern.azimuth_step_rad = sign * 2 * M_PI / pattern.columns;
-      break;
-    case 1:
-      pattern.azimuth_step_rad = sign * uniform(random, 0.001, 0.02);
-      break;
-    case 2:
-      pattern.azimuth_step_rad = sign * uniform(random, 0.02, 0.2);
-      break;
-    default:
-      pattern.azimuth_step_rad = sign * M_PI / 64;
-      pattern.azimuth_first_rad = 0;
-  }
-  pattern.elevation_step_rad = uniform(random, 0.002, 0.08);
-  if (uniform_int(random, 0, 3) == 0) pattern.elevation_step_rad = M_PI / 64;
-  if (uniform_int(random, 0, 3) == 0) {
-    pattern.elevation_first_rad = 1.57;
-    pattern.elevation_step_rad *= -1;
-  }
-  return pattern;
-}
-
-Eigen::Isometry3d random_pose(Random& random, const VoxelGrid& grid) {
-  Eigen::Vector3d q;
-  for (int i = 0; i < 3; ++i) q[i] = uniform(random, -3, std::max({grid.nx, grid.ny, grid.nz}) + 3);
-  if (uniform_int(random, 0, 2) == 0) q = q.array().round();  // On corners of voxels.
-  if (uniform_int(random, 0, 2) == 0)
-    q = q.cwiseMin(Eigen::Vector3d(grid.nx, grid.ny, grid.nz) * 0.7).cwiseMax(0.3);
-  Eigen::Isometry3d pose = worlds::upright(grid.W_min_m + grid.voxel_m * q, uniform(random, -4, 4));
-  const int kind = uniform_int(random, 0, 3);
-  if (kind == 0) pose.linear().setIdentity();
-  if (kind == 1)
-    pose.rotate(Eigen::AngleAxisd(uniform(random, -0.2, 0.2), Eigen::Vector3d::UnitX()));
-  if (kind == 2)
-    pose.linear() = Eigen::Quaterniond(uniform(random, -1, 1), uniform(random, -1, 1),
-                                       uniform(random, -1, 1), uniform(random, 0.1, 1))
-                        .normalized()
-                        .toRotationMatrix();
-  return pose;
-}
-
-RandomScan random_scan(Random& random) {
-  RandomScan result;
-  const int sides[] = {1, 2, 7, 20, 33, 63, 64, 65, 130};
-  result.grid.voxel_m = uniform_int(random, 0, 1) != 0 ? 1.0 : uniform(random, 0.2, 2);
-  result.grid.W_min_m = {uniform(random, -50, 50), uniform(random, -50, 50),
-                         uniform(random, -5, 5)};
-  result.grid.nx = sides[uniform_int(random, 0, 8)];
-  result.grid.ny = sides[uniform_int(random, 0, 6)];
-  result.grid.nz = sides[uniform_int(random, 0, 4)];
-  result.scan.pattern = random_pattern(random);
-  result.T_W_S = random_pose(random, result.grid);
-  InsertConfig& config = result.config;
-  config.range_min_m = uniform(random, 0, 3);
-  config.range_max_m = uniform(random, 4, 60);
-  config.carve_no_return = uniform_int(random, 0, 4) != 0;
-  config.no_return_window = uniform_int(random, 0, 3);
-  config.threads = uniform_int(random, 1, 3);
-  if (uniform_int(random, 0, 1) != 0)
-    config.ground_z_m = result.grid.W_min_m.z() + uniform(random, -2, 5);
-  const double lost = uniform(random, 0, 1), smooth = uniform(random, 0, 1);
-  float range_m = 5;
-  for (std::size_t i = 0; i < result.scan.pattern.beams(); ++i) {
-    if (uniform(random, 0, 1) > smooth) range_m = static_cast<float>(uniform(random, 0.01, 70));
-    float out = uniform(random, 0, 1) < lost ? 0.0F : range_m;
-    if (uniform_int(random, 0, 200) == 0) out = std::numeric_limits<float>::quiet_NaN();
-    if (uniform_int(random, 0, 200) == 0) out = -1;
-    result.scan.ranges_m.push_back(out);
-  }
-  return result;
 }
 
 TEST(VoxelWalk, SteppingEqualsTheSortedCrossings) {
@@ -393,6 +293,87 @@ TEST(VoxelMap, GrownAfterwardsEqualsHighFromTheStart) {
             high.insert(scan, pose, config).returns_outside);
   expect_same(low, high, "grown");
   EXPECT_THROW(low.grow_z(12), std::invalid_argument);
+}
+
+TEST(VoxelMap, GrownIntoKeptLayersEqualsHighFromTheStartForAllScansBefore) {
+  const worlds::World world = worlds::fort(60, 5);  // Up to 14 m high.
+  Random random(6);
+  const int heights[] = {3, 3, 6, 11, 11, 16, 19};
+  VoxelMap low({{0, 0, -0.5}, 1, 60, 60, 3}, 16), high({{0, 0, -0.5}, 1, 60, 60, 3});
+  std::vector<hal::ScanCloud> scans;
+  const std::vector<Eigen::Isometry3d> poses = worlds::stations(world, 60, 5, 7);
+  for (const Eigen::Isometry3d& pose : poses)
+    scans.push_back(world.scan(worlds::sphere(1, 1), pose, 40, random));
+  InsertConfig config;
+  config.range_max_m = 40;
+  config.threads = 2;
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    low.grow_z(heights[i]);
+    high = VoxelMap({{0, 0, -0.5}, 1, 60, 60, heights[i]});
+    InsertReport last;
+    for (std::size_t k = 0; k <= i; ++k) last = high.insert(scans[k], poses[k], config);
+    EXPECT_EQ(low.insert(scans[i], poses[i], config), last) << i;
+    expect_same(low, high, "scan " + std::to_string(i));
+    EXPECT_EQ(low.counts(), high.counts());
+    EXPECT_EQ(planning::boundary_unseen(low), planning::boundary_unseen(high));
+  }
+  for (const int nz : {16, 19}) {  // 19: three layers that were not kept, so all unseen.
+    low.grow_z(nz);
+    high = VoxelMap({{0, 0, -0.5}, 1, 60, 60, 16});
+    for (std::size_t k = 0; k < scans.size(); ++k) high.insert(scans[k], poses[k], config);
+    high.grow_z(nz);
+    expect_same(low, high, "grown to " + std::to_string(nz));
+  }
+}
+
+TEST(VoxelMap, CountsTheReturnsInEachLayerAboveTheBox) {
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    Random random(seed + 7000);
+    RandomScan s = random_scan(random);
+    const int nz_kept = uniform_int(random, 1, 80);
+    const BeamFan fan(s.grid, s.scan.pattern, s.T_W_S);
+    std::vector<std::uint64_t> above;
+    std::size_t outside = 0;
+    for (std::uint32_t c = 0; c < s.scan.pattern.columns; ++c)
+      for (std::uint32_t r = 0; r < s.scan.pattern.rows; ++r) {
+        const float range_m = s.scan.ranges_m[std::size_t{c} * s.scan.pattern.rows + r];
+        if (!(range_m > 0) || range_m < s.config.range_min_m || range_m > s.config.range_max_m)
+          continue;
+        const Voxel v = planning::voxel_of(fan.end(c, r, range_m));
+        outside += !s.grid.contains(v);
+        if (!s.grid.contains({v.x, v.y, 0}) || v.z < s.grid.nz) continue;
+        above.resize(std::max(above.size(), static_cast<std::size_t>(v.z - s.grid.nz) + 1));
+        ++above[static_cast<std::size_t>(v.z - s.grid.nz)];
+      }
+    VoxelMap map(s.grid, nz_kept);
+    const InsertReport report = map.insert(s.scan, s.T_W_S, s.config);
+    EXPECT_EQ(report.returns_above, above) << seed;
+    EXPECT_EQ(report.returns_outside, outside) << seed;
+    EXPECT_EQ(report.layers_needed, s.grid.nz + static_cast<int>(above.size())) << seed;
+  }
+}
+
+TEST(VoxelMap, TakesAtMostAByteForEachVoxelOfTheBox) {
+  for (const int nx : {16, 17, 64, 65, 129, 300, 1000}) {
+    const VoxelMap map({{0, 0, 0}, 1, nx, 40, 10}), higher(map.grid(), 25);
+    EXPECT_LE(map.storage_bytes(), map.grid().size()) << nx;
+    EXPECT_LE(higher.storage_bytes(), map.grid().size() / 10 * 25) << nx;
+  }
+  EXPECT_EQ(VoxelMap({{0, 0, 0}, 1, 320, 300, 30}).storage_bytes(), 320u * 300 * 30 / 4);
+}
+
+TEST(VoxelMap, SetsARunAsItSetsItsVoxels) {
+  Random random(13);
+  VoxelMap runs({{0, 0, 0}, 1, 200, 2, 2}), single(runs.grid());
+  for (int i = 0; i < 2000; ++i) {
+    const int x = uniform_int(random, 0, 199), count = uniform_int(random, 0, 200 - x);
+    const auto state = static_cast<VoxelState>(uniform_int(random, 0, 2));
+    const int y = uniform_int(random, 0, 1), z = uniform_int(random, 0, 1);
+    runs.set_run({x, y, z}, count, state);
+    for (int k = 0; k < count; ++k) single.set({x + k, y, z}, state);
+    ASSERT_EQ(runs, single) << i;
+  }
+  EXPECT_THROW(runs.set_run({150, 0, 0}, 51, VoxelState::unseen), std::out_of_range);
 }
 
 TEST(VoxelMap, RefusesWhatCannotBe) {

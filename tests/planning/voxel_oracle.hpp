@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <map>
 #include <vector>
 
 #include "planning/next_best_view.hpp"
@@ -109,39 +110,21 @@ inline float trusted(const hal::ScanCloud& scan, std::int64_t column, std::int64
   return nearest;
 }
 
-// VoxelMap::insert as the paper says it; carving by walking every beam.
-inline void insert(VoxelMap& map, const hal::ScanCloud& scan, const Eigen::Isometry3d& T_W_S,
-                   const planning::InsertConfig& config) {
-  const planning::VoxelGrid& grid = map.grid();
+// Calls visit(end, has_return) for every beam that says something, in order.
+template <class Visit>
+void for_beams(const planning::VoxelGrid& grid, const hal::ScanCloud& scan,
+               const Eigen::Isometry3d& T_W_S, const planning::InsertConfig& config,
+               const Visit& visit) {
   const planning::BeamFan fan(grid, scan.pattern, T_W_S);
   const double turn = scan.pattern.columns * std::abs(scan.pattern.azimuth_step_rad);
   const bool wraps = std::abs(turn - 2 * M_PI) < std::abs(scan.pattern.azimuth_step_rad) / 2;
   const std::uint32_t rows = scan.pattern.rows;
-  const auto used = [&](float range_m) {
-    return range_m > 0 && range_m >= config.range_min_m && range_m <= config.range_max_m;
-  };
-  for (std::uint32_t c = 0; c < scan.pattern.columns; ++c)
-    for (std::uint32_t r = 0; r < rows; ++r) {
-      const float range_m = scan.ranges_m[std::size_t{c} * rows + r];
-      if (!used(range_m)) continue;
-      const Voxel v = planning::voxel_of(fan.end(c, r, range_m));
-      if (grid.contains(v)) map.set(v, VoxelState::seen_occupied);
-    }
-  const auto carve = [&](planning::LatticePoint end) {
-    const planning::LatticePoint start = fan.scanner();
-    bool inside = false;
-    walk({start.x, start.y, start.z}, {end.x, end.y, end.z}, 2048, [&](Voxel v) {
-      if (!grid.contains(v)) return !inside;
-      inside = true;
-      if (map.at(v) == VoxelState::unseen) map.set(v, VoxelState::seen_empty);
-      return true;
-    });
-  };
   for (std::uint32_t c = 0; c < scan.pattern.columns; ++c)
     for (std::uint32_t r = 0; r < rows; ++r) {
       float range_m = scan.ranges_m[std::size_t{c} * rows + r];
       if (range_m != 0) {
-        if (used(range_m)) carve(fan.end(c, r, range_m));
+        if (range_m > 0 && range_m >= config.range_min_m && range_m <= config.range_max_m)
+          visit(fan.end(c, r, range_m), true);
         continue;
       }
       if (!config.carve_no_return) continue;
@@ -153,9 +136,55 @@ inline void insert(VoxelMap& map, const hal::ScanCloud& scan, const Eigen::Isome
         const double height_m = T_W_S.translation().z() - floor_m;
         range_m = std::min(range_m, static_cast<float>(std::max(0.0, height_m / -fan.climb(c, r))));
       }
-      if (range_m > 0) carve(fan.end(c, r, range_m));
+      if (range_m > 0) visit(fan.end(c, r, range_m), false);
     }
 }
+
+// Calls visit(v) for the voxels of the box on the beam's way, the one of its end among them.
+template <class Visit>
+void walk_beam(const planning::VoxelGrid& grid, const planning::LatticePoint& start,
+               const planning::LatticePoint& end, const Visit& visit) {
+  bool inside = false;
+  walk({start.x, start.y, start.z}, {end.x, end.y, end.z}, 2048, [&](Voxel v) {
+    if (!grid.contains(v)) return !inside;
+    inside = true;
+    visit(v);
+    return true;
+  });
+}
+
+// VoxelMap::insert as the paper says it; carving by walking every beam.
+inline void insert(VoxelMap& map, const hal::ScanCloud& scan, const Eigen::Isometry3d& T_W_S,
+                   const planning::InsertConfig& config) {
+  const planning::VoxelGrid& grid = map.grid();
+  const planning::LatticePoint start = planning::BeamFan(grid, scan.pattern, T_W_S).scanner();
+  for_beams(grid, scan, T_W_S, config, [&](const planning::LatticePoint& end, bool has_return) {
+    if (has_return && grid.contains(planning::voxel_of(end)))
+      map.set(planning::voxel_of(end), VoxelState::seen_occupied);
+  });
+  for_beams(grid, scan, T_W_S, config, [&](const planning::LatticePoint& end, bool) {
+    walk_beam(grid, start, end, [&](Voxel v) {
+      if (map.at(v) == VoxelState::unseen) map.set(v, VoxelState::seen_empty);
+    });
+  });
+}
+
+// planning::BeamCounts by its definition, beam after beam, without an end to counting.
+struct BeamCounts {
+  std::map<Voxel, std::int64_t> hits, passes;
+
+  void add(const planning::VoxelGrid& grid, const hal::ScanCloud& scan,
+           const Eigen::Isometry3d& T_W_S, const planning::InsertConfig& config) {
+    const planning::LatticePoint start = planning::BeamFan(grid, scan.pattern, T_W_S).scanner();
+    for_beams(grid, scan, T_W_S, config, [&](const planning::LatticePoint& end, bool has_return) {
+      const Voxel last = planning::voxel_of(end);
+      if (has_return && grid.contains(last)) ++hits[last];
+      walk_beam(grid, start, end, [&](Voxel v) {
+        if (v != last) ++passes[v];
+      });
+    });
+  }
+};
 
 // The same carving by a plain dense walk made to be fast (one byte per voxel, no look at what it
 // knows already): what VoxelMap::insert is measured against. The beams' reach is shared.
