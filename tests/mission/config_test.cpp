@@ -99,9 +99,12 @@ overlap_min = 0.25
 [phase2]
 voxel_m = 0.5
 height_m = 12.5
+height_max_m = 50
 gain_min_voxels = 3
 views_max = 4
 carve_no_return = false
+foliage = true
+foliage_share_min = 0.75
 )",
                             R"(name = "rn"
 backend = "sim"
@@ -147,9 +150,12 @@ phase1.gain_min=0
 phase1.overlap_min=0.25
 phase2.voxel_m=0.5
 phase2.height_m=12.5
+phase2.height_max_m=50
 phase2.gain_min_voxels=3
 phase2.views_max=4
 phase2.carve_no_return=false
+phase2.foliage=true
+phase2.foliage_share_min=0.75
 robot.name=rn
 robot.backend=sim
 robot.body.radius_m=0.25

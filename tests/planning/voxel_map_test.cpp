@@ -123,12 +123,6 @@ TEST(VoxelMap, StartsUnseenAndIsUnseenOutside) {
   EXPECT_EQ(map.at({70, 0, 0}), VoxelState::unseen);
 }
 
-TEST(VoxelMap, TakesAtMostOneBytePerVoxel) {
-  const VoxelMap map({{0, 0, 0}, 1, 300, 300, 30});
-  const std::size_t bytes = 2 * 8 * static_cast<std::size_t>(map.row_words()) * 300 * 30;
-  EXPECT_LE(bytes, map.grid().size());
-}
-
 TEST(VoxelMap, MarksThePointAndCarvesTheWayToTheScanner) {
   VoxelMap map({{0, 0, 0}, 1, 10, 1, 1});
   const InsertReport report =
