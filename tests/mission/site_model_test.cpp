@@ -144,28 +144,11 @@ TEST(SiteModel, TakesAtMostAByteForEachVoxelUpToWhereItMayGrow) {
   }
 }
 
-// Beams through a hedge at y = 20 to 22 come back from it one time in ten.
+// With a thin hedge at y = 20 to 22.
 hal::ScanCloud scan_over_hedge(const Eigen::Isometry3d& pose, double tower_m) {
   worlds::Random random(3);
-  const worlds::World world = tower(tower_m);
-  const worlds::Box hedge{{0, 20, 0}, {60, 22, 3}};
-  hal::ScanCloud scan = world.scan(worlds::sphere(0.5, 0.25), pose, 100, random);
-  std::size_t beam = 0;
-  for (std::uint32_t c = 0; c < scan.pattern.columns; ++c)
-    for (std::uint32_t r = 0; r < scan.pattern.rows; ++r, ++beam) {
-      const double azimuth = c * scan.pattern.azimuth_step_rad;
-      const double elevation =
-          scan.pattern.elevation_first_rad + r * scan.pattern.elevation_step_rad;
-      const Eigen::Vector3d direction =
-          pose.linear() * Eigen::Vector3d(std::cos(elevation) * std::cos(azimuth),
-                                          std::cos(elevation) * std::sin(azimuth),
-                                          std::sin(elevation));
-      const double enter_m = worlds::hit(hedge, pose.translation(), direction);
-      float& range_m = scan.ranges_m[beam];
-      if (std::isfinite(enter_m) && (range_m == 0 || enter_m < range_m) &&
-          worlds::uniform_int(random, 0, 9) == 0)
-        range_m = static_cast<float>(enter_m + worlds::uniform(random, 0, 1));
-    }
+  hal::ScanCloud scan = tower(tower_m).scan(worlds::sphere(0.5, 0.25), pose, 100, random);
+  worlds::grow_bush(scan, pose, {{0, 20, 0}, {60, 22, 3}}, 0.1, random);
   return scan;
 }
 

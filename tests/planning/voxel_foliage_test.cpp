@@ -15,7 +15,6 @@ using planning::Voxel;
 using planning::VoxelMap;
 using planning::VoxelState;
 using worlds::Random;
-using worlds::uniform;
 
 TEST(BeamCounts, EqualTheLiteralWalkForAnyScanAndNumberOfThreads) {
   std::int64_t hits = 0, passes = 0;
@@ -89,35 +88,7 @@ TEST(BeamCounts, CallAVoxelFoliageFromTheShareOnAndNotBelow) {
   EXPECT_FALSE(counts.foliage({2, 0, 0}, {.share_min = 0.5, .passes_min = 1}));
 }
 
-// A bush of 4 x 8 x 4 m between the scanners and a wall: a beam is stopped in it with probability
-// 0.15 per metre.
-hal::ScanCloud scan_through_bush(const worlds::World& walls, const Eigen::Isometry3d& T_W_S,
-                                 Random& random) {
-  const worlds::Box bush{{10, 6, 0}, {14, 14, 4}};
-  hal::ScanCloud scan = walls.scan(worlds::sphere(0.5, 0.5), T_W_S, 60, random);
-  std::size_t beam = 0;
-  for (std::uint32_t c = 0; c < scan.pattern.columns; ++c)
-    for (std::uint32_t r = 0; r < scan.pattern.rows; ++r, ++beam) {
-      const double azimuth = c * scan.pattern.azimuth_step_rad;
-      const double elevation =
-          scan.pattern.elevation_first_rad + r * scan.pattern.elevation_step_rad;
-      const Eigen::Vector3d direction =
-          T_W_S.linear() * Eigen::Vector3d(std::cos(elevation) * std::cos(azimuth),
-                                           std::cos(elevation) * std::sin(azimuth),
-                                           std::sin(elevation));
-      const double enter_m = worlds::hit(bush, T_W_S.translation(), direction);
-      if (!std::isfinite(enter_m)) continue;
-      const double depth_m = -std::log(uniform(random, 1e-9, 1)) / 0.15;
-      const Eigen::Vector3d at = T_W_S.translation() + (enter_m + depth_m) * direction;
-      const bool inside =
-          (at.array() >= bush.min_m.array()).all() && (at.array() <= bush.max_m.array()).all();
-      float& range_m = scan.ranges_m[beam];
-      if (inside && (range_m == 0 || enter_m + depth_m < range_m))
-        range_m = static_cast<float>(enter_m + depth_m);
-    }
-  return scan;
-}
-
+// A bush of 4 x 8 x 4 m between the scanners and a wall.
 TEST(SeeThrough, OpensABushAndLeavesWallsStanding) {
   worlds::World walls;
   walls.boxes.push_back({{20.4, 0, 0}, {22, 20, 8}});
@@ -129,7 +100,8 @@ TEST(SeeThrough, OpensABushAndLeavesWallsStanding) {
   config.ground_z_m = 0;
   for (const double y : {4.3, 9.6, 15.2}) {
     const Eigen::Isometry3d pose = worlds::upright({3.5, y, 1.8}, 0);
-    const hal::ScanCloud scan = scan_through_bush(walls, pose, random);
+    hal::ScanCloud scan = walls.scan(worlds::sphere(0.5, 0.5), pose, 60, random);
+    worlds::grow_bush(scan, pose, {{10, 6, 0}, {14, 14, 4}}, 0.15, random);
     map.insert(scan, pose, config);
     counts.add(scan, pose, config);
   }

@@ -59,6 +59,15 @@ inline hal::ScanPattern sphere(double azimuth_step_deg, double elevation_step_de
   return pattern;
 }
 
+// Of a beam in S.
+inline Eigen::Vector3d direction_of(const hal::ScanPattern& pattern, std::uint32_t column,
+                                    std::uint32_t row) {
+  const double azimuth = pattern.azimuth_first_rad + column * pattern.azimuth_step_rad;
+  const double elevation = pattern.elevation_first_rad + row * pattern.elevation_step_rad;
+  return {std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
+          std::sin(elevation)};
+}
+
 // Ground at z = 0 and boxes on it.
 struct World {
   std::vector<Box> boxes;
@@ -78,12 +87,7 @@ struct World {
     cloud.pattern = pattern;
     for (std::uint32_t c = 0; c < pattern.columns; ++c)
       for (std::uint32_t r = 0; r < pattern.rows; ++r) {
-        const double azimuth = pattern.azimuth_first_rad + c * pattern.azimuth_step_rad;
-        const double elevation = pattern.elevation_first_rad + r * pattern.elevation_step_rad;
-        const Eigen::Vector3d direction =
-            T_W_S.linear() * Eigen::Vector3d(std::cos(elevation) * std::cos(azimuth),
-                                             std::cos(elevation) * std::sin(azimuth),
-                                             std::sin(elevation));
+        const Eigen::Vector3d direction = T_W_S.linear() * direction_of(pattern, c, r);
         const double range = range_m(T_W_S.translation(), direction);
         const bool lost = direction.z() < 0 && -direction.z() < std::sin(drop_out_deg * kDegree);
         const double noise = noise_m > 0 ? uniform(random, -noise_m, noise_m) : 0;
@@ -93,6 +97,25 @@ struct World {
     return cloud;
   }
 };
+
+// Adds a bush to a scan: a beam that goes through its box is stopped in it with the given
+// probability per metre, if nothing stopped it before.
+inline void grow_bush(hal::ScanCloud& scan, const Eigen::Isometry3d& T_W_S, const Box& bush,
+                      double per_m, Random& random) {
+  std::size_t beam = 0;
+  for (std::uint32_t c = 0; c < scan.pattern.columns; ++c)
+    for (std::uint32_t r = 0; r < scan.pattern.rows; ++r, ++beam) {
+      const Eigen::Vector3d direction = T_W_S.linear() * direction_of(scan.pattern, c, r);
+      const double enter_m = hit(bush, T_W_S.translation(), direction);
+      if (!std::isfinite(enter_m)) continue;
+      const double stop_m = enter_m - std::log(uniform(random, 1e-9, 1)) / per_m;
+      const Eigen::Vector3d at = T_W_S.translation() + stop_m * direction;
+      float& range_m = scan.ranges_m[beam];
+      if ((at.array() >= bush.min_m.array()).all() && (at.array() <= bush.max_m.array()).all() &&
+          (range_m == 0 || stop_m < range_m))
+        range_m = static_cast<float>(stop_m);
+    }
+}
 
 // Something like a fort of size_m x size_m: an outer wall with a gate, a ring of casemates around
 // a court, huts in the court and trees (boxes) outside. No roof is seen from the ground.
