@@ -115,6 +115,23 @@ ViewRule::ViewRule(const ViewLimits& limits, double voxel_m) {
   distance2_max_ = static_cast<std::int64_t>(std::floor(farthest * farthest * (1 + kRounding)));
   const double cosine = std::cos(limits.grazing_max_deg * std::numbers::pi / 180);
   cos2_grazing_ = cosine * cosine;
+  if (!(limits.density_min_ppm2 >= 0) || !(limits.beams_per_sr >= 0))
+    throw std::invalid_argument("view limits: densities must be 0 or more");
+  any_density_ = limits.density_min_ppm2 == 0;
+  if (any_density_) return;
+  const double ratio = limits.beams_per_sr / (limits.density_min_ppm2 * voxel_m * voxel_m);
+  // Whole numbers decide, so that the interval of dense() has no holes. No scanner comes near the
+  // cap, which keeps products below 2^128.
+  constexpr double kRatioMax = 1e12;
+  const double capped = std::min(ratio, kRatioMax);
+  dense_ = static_cast<Wide>(std::ceil(capped * capped * 0x1.0p20));
+}
+
+bool ViewRule::dense(std::int64_t outward2, std::int64_t distance2,
+                     std::int64_t horizontal2) const {
+  if (any_density_) return true;
+  const auto wide = [](std::int64_t n) { return static_cast<Wide>(n); };
+  return wide(outward2) * dense_ >= ((wide(distance2) * wide(distance2) * wide(horizontal2)) << 20);
 }
 
 bool ViewRule::admits(const BoundaryVoxel& u, Voxel p) const {
@@ -122,21 +139,22 @@ bool ViewRule::admits(const BoundaryVoxel& u, Voxel p) const {
   const std::int64_t distance2 = square(x) + square(y) + square(z);
   if (!in_range(distance2)) return false;
   const auto seen = [&](Face minus, Face plus, std::int64_t n) {
-    return n != 0 && (u.faces & (n < 0 ? minus : plus)) != 0 && along_normal(n * n, distance2);
+    return n != 0 && (u.faces & (n < 0 ? minus : plus)) != 0 && along_normal(n * n, distance2) &&
+           dense(n * n, distance2, square(x) + square(y));
   };
   return seen(kFaceXMinus, kFaceXPlus, x) || seen(kFaceYMinus, kFaceYPlus, y) ||
          seen(kFaceZMinus, kFaceZPlus, z);
 }
 
-bool clear_between(const VoxelMap& map, Voxel u, Voxel p) {
+std::optional<Voxel> first_between(const VoxelMap& map, Voxel from, Voxel to) {
   struct Axis {
     int at, sign;
     std::int64_t next, step;  // Crossing times in 1 / (2 |dx| |dy| |dz|), zeros left out.
   };
-  const std::int64_t d[3] = {p.x - u.x, p.y - u.y, p.z - u.z};
+  const std::int64_t d[3] = {to.x - from.x, to.y - from.y, to.z - from.z};
   const auto weight = [&](int i) { return d[i] == 0 ? std::int64_t{1} : std::abs(d[i]); };
   Axis axes[3];
-  const int start[3] = {u.x, u.y, u.z};
+  const int start[3] = {from.x, from.y, from.z};
   for (int i = 0; i < 3; ++i) {
     const std::int64_t half = weight((i + 1) % 3) * weight((i + 2) % 3);
     axes[i] = {start[i], d[i] < 0 ? -1 : 1, d[i] == 0 ? INT64_MAX : half, 2 * half};
@@ -149,9 +167,13 @@ bool clear_between(const VoxelMap& map, Voxel u, Voxel p) {
       axis.next += axis.step;
     }
     const Voxel v{axes[0].at, axes[1].at, axes[2].at};
-    if (v == p) return true;
-    if (map.at(v) != VoxelState::seen_empty) return false;
+    if (v == to) return std::nullopt;
+    if (map.at(v) != VoxelState::seen_empty) return v;
   }
+}
+
+bool clear_between(const VoxelMap& map, Voxel u, Voxel p) {
+  return !first_between(map, u, p);
 }
 
 std::vector<std::uint32_t> tally(const VoxelMap& map, const std::vector<BoundaryVoxel>& boundary,
@@ -182,6 +204,36 @@ std::vector<std::uint32_t> tally(const VoxelMap& map, const std::vector<Boundary
     }
   }
   return result;
+}
+
+std::vector<std::uint8_t> seen_by_any(const VoxelMap& map,
+                                      const std::vector<BoundaryVoxel>& boundary,
+                                      const std::vector<Voxel>& candidates,
+                                      const ViewLimits& limits, int threads) {
+  const ViewRule rule(limits, map.grid().voxel_m);
+  for (const BoundaryVoxel& u : boundary) check(map.grid(), u.v, "boundary voxel");
+  const SortedCandidates sorted = sort_candidates(map, candidates);
+  const std::size_t tallies = sorted.layers.empty() ? 0 : sorted.layers.back().tally_end();
+  const BlockedRows blocked(map);
+  std::vector<Sweep> sweeps(static_cast<std::size_t>(std::max(threads, 1)),
+                            Sweep(map.grid(), blocked, rule, tallies));
+  std::vector<std::uint8_t> seen(boundary.size());
+  // Neighbours in the list share a layer: a thread seldom changes its paths.
+  for_pieces(threads, boundary.size(), 128, [&](int thread, std::size_t begin, std::size_t end) {
+    Sweep& sweep = sweeps[static_cast<std::size_t>(thread)];
+    for (const CandidateLayer& layer : sorted.layers)
+      for (std::size_t i = begin; i < end; ++i) {
+        if (seen[i] != 0) continue;
+        const std::uint64_t before = sweep.seen();
+        sweep.add(boundary[i], layer);
+        seen[i] = sweep.seen() > before;
+      }
+    for (std::size_t i = begin; i < end; ++i)
+      for (std::size_t k = 0; seen[i] == 0 && k < sorted.walked.size(); ++k)
+        seen[i] = rule.admits(boundary[i], sorted.walked[k]) &&
+                  clear_between(map, boundary[i].v, sorted.walked[k]);
+  });
+  return seen;
 }
 
 std::vector<std::uint32_t> visible_from(const VoxelMap& map,

@@ -28,11 +28,18 @@ RowLimits limits_of(const ViewRule& rule, std::int64_t b, std::int64_t c) {
   limits.in_range_last = end - 1;
   limits.in_range_first =
       first_that(0, end, [&](int a) { return distance2(a) >= rule.distance2_min(); });
-  limits.x_face_first = first_that(
-      1, end + 1, [&](std::int64_t a) { return rule.along_normal(a * a, distance2(a)); });
+  const auto sees = [&](std::int64_t n, std::int64_t a) {
+    return rule.along_normal(n * n, distance2(a)) && rule.dense(n * n, distance2(a), a * a + b * b);
+  };
+  limits.x_face_first = end;
+  for (int a = 1; a < end; ++a) {  // An interval: nearer is too grazing, farther too sparse.
+    if (!sees(a, a)) continue;
+    limits.x_face_first = std::min(limits.x_face_first, a);
+    limits.x_face_last = a;
+  }
   const auto last_along = [&](std::int64_t n) {
     if (n == 0) return -1;
-    return first_that(0, end, [&](int a) { return !rule.along_normal(n * n, distance2(a)); }) - 1;
+    return first_that(0, end, [&](int a) { return !sees(n, a); }) - 1;
   };
   limits.y_face_last = last_along(b);
   limits.z_face_last = last_along(c);

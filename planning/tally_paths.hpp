@@ -20,7 +20,7 @@ namespace planning {
 // all in |a|.
 struct RowLimits {
   int in_range_first{}, in_range_last{-1};  // Empty if first > last.
-  int x_face_first{};                       // A face towards the candidate along x, from here on.
+  int x_face_first{}, x_face_last{-1};      // A face towards the candidate along x, within these.
   int y_face_last{-1}, z_face_last{-1};     // A face towards the row along y or z, up to here.
 };
 

@@ -117,9 +117,9 @@ void Sweep::add(const BoundaryVoxel& u, const CandidateLayer& layer) {
     const auto admit = [&](Face x_face) {
       const bool faced = (u.faces & x_face) != 0;
       const int from = std::max(limits.in_range_first, limits.x_face_first);
-      return Admitted{
-          {limits.in_range_first, from},
-          {std::min(faced_last, limits.in_range_last), faced ? limits.in_range_last : -1}};
+      return Admitted{{limits.in_range_first, from},
+                      {std::min(faced_last, limits.in_range_last),
+                       faced ? std::min(limits.x_face_last, limits.in_range_last) : -1}};
     };
     rays.y_sign = b < 0 ? -1 : 1;
     rays.step_y = rays.y_sign;
@@ -163,6 +163,7 @@ void Sweep::add_side(const Rays& rays, const CandidateLayer& layer, const Candid
       if (skip != 0) bits = candidates(first += skip);
       Live live{bits, first, 0, 0};
       cast<kSide>(rays, live);
+      seen_ += static_cast<std::uint64_t>(std::popcount(live.bits));
       const std::size_t zero =
           row.tally_begin + static_cast<std::size_t>(rays.u.x + kSide * first - row.x_first);
       for (; live.bits != 0; live.bits &= live.bits - 1) {

@@ -75,6 +75,7 @@ class Sweep {
 
   void add(const BoundaryVoxel& u, const CandidateLayer& layer);
   const std::vector<std::uint32_t>& tallies() const { return tallies_; }
+  std::uint64_t seen() const { return seen_; }  // The sum of all tallies.
 
  private:
   // The candidates a = side |a| whose |a| is in one of two spans (inclusive).
@@ -114,6 +115,7 @@ class Sweep {
   ViewRule rule_;
   std::vector<LayerPaths> paths_;  // At most one: of the |c| last asked for.
   std::vector<std::uint32_t> tallies_;
+  std::uint64_t seen_{};
 };
 
 }  // namespace planning

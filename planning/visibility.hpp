@@ -60,6 +60,7 @@ class Visibility {
   Visibility(const std::vector<Wall>& walls, const SensorLimits& limits);
 
   const std::vector<Wall>& walls() const { return walls_; }
+  const SensorLimits& limits() const { return limits_; }
 
   // What is imaged of the target walls: in order of wall and place, disjoint, kPieceMinM or longer.
   std::vector<WallPiece> from(const Candidate& viewpoint) const;

@@ -2,7 +2,10 @@
 #include <benchmark/benchmark.h>
 #include <octomap/octomap.h>
 
+#include "planning/never_visible.hpp"
 #include "planning/next_best_view.hpp"
+#include "planning/next_views.hpp"
+#include "planning/stop_certificate.hpp"
 #include "tests/planning/voxel_oracle.hpp"
 #include "tests/planning/voxel_worlds.hpp"
 
@@ -88,6 +91,45 @@ void VisibleFrom(benchmark::State& state) {
     benchmark::DoNotOptimize(planning::visible_from(s.map, s.boundary, p, s.limits));
 }
 BENCHMARK(VisibleFrom)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+// Five views at once, given the tally (argument: threads).
+void NextViews(benchmark::State& state) {
+  const Site& s = site(100);
+  const int threads = static_cast<int>(state.range(0));
+  const auto counts = planning::tally(s.map, s.boundary, s.candidates, s.limits, threads);
+  std::vector<planning::PlannedView> views;
+  for (auto _ : state)
+    views = planning::next_views(s.map, s.boundary, s.candidates, counts, s.limits,
+                                 {.views_max = 5, .adds_min_voxels = 1, .threads = threads});
+  std::uint64_t adds = 0;
+  for (const planning::PlannedView& view : views) adds += view.adds_voxels;
+  finish(state, s, adds);
+}
+BENCHMARK(NextViews)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+// Both tallies of the stop certificate.
+void StopCertificate(benchmark::State& state) {
+  const Site& s = site(100);
+  planning::OptimisticConfig config;
+  config.threads = static_cast<int>(state.range(0));
+  planning::StopCertificate certificate;
+  for (auto _ : state)
+    certificate =
+        planning::stop_certificate(s.map, s.boundary, s.candidates, s.limits, 100, config);
+  finish(state, s, certificate.optimistic_max());
+}
+BENCHMARK(StopCertificate)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+void NeverVisible(benchmark::State& state) {
+  const Site& s = site(100);
+  std::size_t never = 0;
+  for (auto _ : state)
+    never = planning::never_visible(s.map, s.boundary, s.candidates, s.limits,
+                                    static_cast<int>(state.range(0)))
+                .size();
+  finish(state, s, never);
+}
+BENCHMARK(NeverVisible)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 // OctoMap's computeRayKeys and search for every 400th boundary voxel; multiply by 400.
 void TallyPartByOctomapKeyRays(benchmark::State& state) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/planning/view_cases.hpp"
 #include "tests/planning/voxel_oracle.hpp"
 #include "tests/planning/voxel_worlds.hpp"
 
@@ -14,7 +15,9 @@ using planning::VoxelGrid;
 using planning::VoxelMap;
 using planning::VoxelState;
 using worlds::Random;
-using worlds::uniform;
+using worlds::random_candidates;
+using worlds::random_limits;
+using worlds::Site;
 using worlds::uniform_int;
 
 using Tally = std::vector<std::uint32_t>;
@@ -139,32 +142,6 @@ TEST(Tally, IsEmptyWithoutCandidatesAndZeroWithoutBoundary) {
   EXPECT_THROW(planning::tally(map, {{{0, -1, 0}, 1}}, {}, {}), std::invalid_argument);
 }
 
-ViewLimits random_limits(Random& random, double longest_m) {
-  ViewLimits limits;
-  limits.range_min_m = uniform_int(random, 0, 2) == 0 ? 0 : uniform(random, 0, 4);
-  limits.range_max_m = limits.range_min_m + uniform(random, 0, 1.2) * longest_m;
-  const double grazing[] = {90, 70, 45, 60, uniform(random, 0, 90), 0};
-  limits.grazing_max_deg = grazing[uniform_int(random, 0, 5)];
-  return limits;
-}
-
-// Some of the seen-empty voxels of some layers, and a few others.
-std::vector<Voxel> random_candidates(Random& random, const VoxelMap& map, int most) {
-  const VoxelGrid& grid = map.grid();
-  std::vector<Voxel> result;
-  const int layers = uniform_int(random, 1, 3);
-  for (int l = 0; l < layers; ++l) {
-    const int z = uniform_int(random, 0, grid.nz - 1);
-    const double share = std::min(1.0, static_cast<double>(most) / (grid.nx * grid.ny * layers));
-    for (int y = 0; y < grid.ny; ++y)
-      for (int x = 0; x < grid.nx; ++x) {
-        const bool empty = map.at({x, y, z}) == VoxelState::seen_empty;
-        if (uniform(random, 0, 1) < share * (empty ? 1 : 0.02)) result.push_back({x, y, z});
-      }
-  }
-  return result;
-}
-
 // Noise of any density, in boxes of any shape.
 TEST(Tally, EqualsTheLiteralLoopInEveryCellOfRandomMaps) {
   const double densities[] = {0, 0.0005, 0.003, 0.01, 0.03, 0.1, 0.3, 0.6, 0.9};
@@ -212,19 +189,6 @@ TEST(Tally, EqualsTheLiteralLoopWhereRaysAreLong) {
     if (HasFatalFailure()) return;
   }
 }
-
-struct Site {
-  worlds::World world = worlds::fort(120, 5);
-  VoxelMap map{{{0, 0, -0.5}, 1.0, 120, 120, 20}};
-
-  Site() {
-    Random random(6);
-    planning::InsertConfig config;
-    config.range_max_m = 60;
-    for (const Eigen::Isometry3d& pose : worlds::stations(world, 120, 6, 7))
-      map.insert(world.scan(worlds::sphere(0.5, 0.4), pose, 60, random), pose, config);
-  }
-};
 
 TEST(Tally, EqualsTheLiteralLoopInEveryCellOfASiteForAnyNumberOfThreads) {
   const Site site;

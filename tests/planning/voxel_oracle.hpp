@@ -222,13 +222,14 @@ inline void insert_densely(VoxelMap& map, const hal::ScanCloud& scan,
           map.set({x, y, z}, VoxelState::seen_empty);
 }
 
-inline std::vector<BoundaryVoxel> boundary_unseen(const VoxelMap& map) {
+// Voxels of the state with a seen-empty neighbour behind some face.
+inline std::vector<BoundaryVoxel> exposed(const VoxelMap& map, VoxelState state) {
   const Voxel beside[6] = {{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}};
   std::vector<BoundaryVoxel> result;
   for (int z = 0; z < map.grid().nz; ++z)
     for (int y = 0; y < map.grid().ny; ++y)
       for (int x = 0; x < map.grid().nx; ++x) {
-        if (map.at({x, y, z}) != VoxelState::unseen) continue;
+        if (map.at({x, y, z}) != state) continue;
         unsigned faces = 0;
         for (int f = 0; f < 6; ++f)
           if (map.at({x + beside[f].x, y + beside[f].y, z + beside[f].z}) == VoxelState::seen_empty)
@@ -236,6 +237,10 @@ inline std::vector<BoundaryVoxel> boundary_unseen(const VoxelMap& map) {
         if (faces != 0) result.push_back({{x, y, z}, static_cast<std::uint8_t>(faces)});
       }
   return result;
+}
+
+inline std::vector<BoundaryVoxel> boundary_unseen(const VoxelMap& map) {
+  return exposed(map, VoxelState::unseen);
 }
 
 // ------------------------------------------------------------------ Phase II
@@ -251,7 +256,8 @@ inline bool counts_geometrically(const BoundaryVoxel& u, Voxel p,
   for (int f = 0; f < 6; ++f)
     if ((u.faces >> f & 1) != 0 && along[f] > 0 &&
         static_cast<double>(std::int64_t{along[f]} * along[f]) >=
-            rule.cos2_grazing() * static_cast<double>(n2))
+            rule.cos2_grazing() * static_cast<double>(n2) &&
+        rule.dense(std::int64_t{along[f]} * along[f], n2, n2 - std::int64_t{d.z} * d.z))
       return true;
   return false;
 }
