@@ -71,6 +71,9 @@ struct Phase2Config {
   bool carve_no_return = true;
   bool foliage = false;  // Tell thin vegetation from walls (planning/voxel_foliage.hpp).
   double foliage_share_min = 0.8;
+  std::string choose = "gain";  // "gain" (the paper's) | "gain_per_minute"
+  int views_ahead = 5;          // That the decision log looks ahead.
+  double density_min_ppm2 = 0;  // Points per m^2 that every surface should get; 0: no such goal.
 };
 
 // Where a key was written. Line and column count from 1; 0 says "the whole file" (or no file).

@@ -94,7 +94,16 @@ SectionSpec phase2_section() {
                       "Views look through seen-occupied voxels that most beams pass, such as "
                       "thin vegetation"),
            keys.number("foliage_share_min", &P::foliage_share_min, 0.5, 1, "share",
-                       "Of the beams into such a voxel that must have passed it")},
+                       "Of the beams into such a voxel that must have passed it"),
+           keys.other("choose", &P::choose,
+                      "The view that sees the most, or the most for the minutes that road (or "
+                      "setting up) and scan take",
+                      {"gain", "gain_per_minute"}),
+           keys.number("views_ahead", &P::views_ahead, 0, 100, "",
+                       "How many views the decision log looks ahead, with what each would add"),
+           keys.number("density_min_ppm2", &P::density_min_ppm2, 0, 1e6, "points/m2",
+                       "Surfaces that no scan put as many points on are worth seeing again; 0: no "
+                       "such goal")},
           {}};
 }
 

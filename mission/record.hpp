@@ -1,7 +1,9 @@
 // Everything a run decided and did, as values: what the store writes and the report draws.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,7 +13,9 @@
 #include "nav/free_space.hpp"
 #include "nav/site_map.hpp"
 #include "planning/cover.hpp"
+#include "planning/stop_certificate.hpp"
 #include "planning/voxel_map.hpp"
+#include "planning/why.hpp"
 
 namespace mission {
 
@@ -76,6 +80,29 @@ struct GnssCounts {
   std::uint64_t resets{};   // The localizer was lost and took the fixes' word.
 };
 
+// What Phase II leaves at its end, and why.
+struct Leftover {
+  planning::StopCertificate certificate;
+  std::optional<Eigen::Vector2d> optimistic_at_m;  // From where its optimistic maximum is seen.
+  bool foliage{};  // What blocks now may be found to be foliage later: then nothing is proven.
+  // Boundary unseen voxels that no cell can see as the map stands (roofs, pockets: work for a mast
+  // or a drone), by planning::ViewVerdict.
+  std::array<std::uint64_t, static_cast<std::size_t>(planning::ViewVerdict::visible)>
+      never_visible{};
+
+  bool proven() const { return certificate.proven() && !foliage; }
+  std::uint64_t never_visible_voxels() const {
+    return std::accumulate(never_visible.begin(), never_visible.end(), std::uint64_t{0});
+  }
+};
+
+// How much of the surface seen so far has the points per m^2 asked for.
+struct DensityFacts {
+  double goal_ppm2{};              // 0: none was asked for.
+  std::uint64_t surface_voxels{};  // Seen-occupied with a seen-empty neighbour.
+  std::uint64_t reached_voxels{};
+};
+
 // Simulation only: the run judged by the world that it could not see.
 struct Truth {
   std::uint64_t surface_visible{};  // Surface voxels visible from some reachable ground cell.
@@ -107,6 +134,8 @@ struct RunRecord {
   double driven_total_m{};
   std::string end;  // Why it ended, in words.
   bool completed{};
+  std::optional<Leftover> leftover;
+  DensityFacts density;
   std::optional<Truth> truth;
 };
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <numbers>
 
+#include "mission/leftover.hpp"
 #include "mission/progress.hpp"
 #include "mission/report_html.hpp"
 #include "mission/report_parts.hpp"
@@ -72,6 +73,11 @@ std::string key_figures(const Facts& facts) {
   return "<div class=\"figures\">\n" + out + "</div>\n";
 }
 
+std::string leftover(const RunRecord& run) {
+  const std::string text = leftover_text(run);
+  return text.empty() ? "" : html::element("p", escaped(text)) + "\n";
+}
+
 std::string voxels(const RunRecord& run) {
   return section(
       "Voxels",
@@ -80,7 +86,7 @@ std::string voxels(const RunRecord& run) {
                        "would see; below {} voxels no further view is taken.",
                        run.gain_min_voxels)) +
           "<div class=\"pair\">\n" + report::voxel_table(run) + "<div>\n" +
-          report::voxel_curves(run) + "</div>\n</div>\n");
+          report::voxel_curves(run) + "</div>\n</div>\n" + leftover(run));
 }
 
 std::string walls(const Facts& facts) {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 #include <span>
 
@@ -36,12 +35,6 @@ struct Bounds {
 
 bool scanned(const AreaTask& task) {
   return task.mode != AreaMode::skip;
-}
-
-planning::ViewLimits view_limits(const ScannerConfig& scanner) {
-  return {.range_min_m = scanner.range_min_m,
-          .range_max_m = scanner.range_max_m,
-          .grazing_max_deg = scanner.grazing_max_deg};
 }
 
 // Layers that the map has to keep, so that the box can grow: as high as scans can see from the
@@ -89,7 +82,8 @@ SiteModel::SiteModel(const MissionConfig& config, const nav::SiteMap& map,
       tasks_(std::move(tasks)),
       threads_(threads),
       map_(voxel_grid(config, map, tasks_),
-           layers_kept(config, voxel_grid(config, map, tasks_), tasks_)) {
+           layers_kept(config, voxel_grid(config, map, tasks_), tasks_)),
+      density_(config.robot.scanner, config.phase2.density_min_ppm2, threads) {
   if (config_.phase2.foliage) beams_.emplace(map_);
   find_cells();
   const planning::VoxelGrid& grid = map_.grid();
@@ -147,10 +141,17 @@ void SiteModel::restore_ground() {
 // The frontier of what is seen, as far as it lies within the site's boundary.
 void SiteModel::find_boundary() {
   boundary_ = planning::boundary_unseen(map_);
+  std::erase_if(boundary_, [&](const planning::BoundaryVoxel& u) { return !is_in_site(u.v); });
+}
+
+bool SiteModel::is_in_site(const planning::Voxel& v) const {
   const auto columns = static_cast<std::size_t>(map_.grid().nx);
-  std::erase_if(boundary_, [&](const planning::BoundaryVoxel& u) {
-    return !in_site_[static_cast<std::size_t>(u.v.y) * columns + static_cast<std::size_t>(u.v.x)];
-  });
+  return in_site_[static_cast<std::size_t>(v.y) * columns + static_cast<std::size_t>(v.x)] != 0;
+}
+
+bool SiteModel::is_set_aside(const planning::Voxel& v) const {
+  const auto tries = tries_.find(v);
+  return tries != tries_.end() && tries->second >= kTriesMax;
 }
 
 Eigen::Vector3d SiteModel::cell_position_m(const ViewCell& cell) const {
@@ -182,6 +183,7 @@ ScanEffect SiteModel::add(const hal::ScanCloud& scan,
       report.returns_outside - std::accumulate(new_layers.begin(), new_layers.end(), 0ULL);
   find_boundary();
   look_through();
+  density_.add(planner_map(), scan.pattern, T_W_S);
   const Eigen::Vector3f W_scanner_m = T_W_S.translation().cast<float>();
   for (const Eigen::Vector3f& W_point_m : W_points_m)
     if ((W_point_m - W_scanner_m).squaredNorm() < kObstacleRangeMaxM * kObstacleRangeMaxM)
@@ -246,38 +248,65 @@ void SiteModel::note_obstacle(const Eigen::Vector3f& W_point_m, double ground_z_
 std::vector<planning::BoundaryVoxel> SiteModel::worth_seeing() const {
   std::vector<planning::BoundaryVoxel> worth;
   worth.reserve(boundary_.size());
-  for (const planning::BoundaryVoxel& u : boundary_) {
-    const auto tries = tries_.find(u.v);
-    if (tries == tries_.end() || tries->second < kTriesMax) worth.push_back(u);
-  }
+  for (const planning::BoundaryVoxel& u : boundary_)
+    if (!is_set_aside(u.v)) worth.push_back(u);
   return worth;
 }
 
-std::vector<NextView> SiteModel::next_views() {
-  std::vector<std::size_t> open;  // Indices of cells that may be asked for.
-  std::vector<planning::Voxel> candidates;
-  for (std::size_t i = 0; i < cells_.size(); ++i) {
-    if (excluded_[i] || planner_map().at(cells_[i].voxel) != planning::VoxelState::seen_empty)
-      continue;
-    open.push_back(i);
-    candidates.push_back(cells_[i].voxel);
-  }
-  const std::vector<std::uint32_t> counts = planning::tally(
-      planner_map(), worth_seeing(), candidates, view_limits(config_.robot.scanner), threads_);
+namespace {
 
+std::vector<planning::Voxel> voxels_of(const std::vector<CellTally>& tallies) {
+  std::vector<planning::Voxel> voxels;
+  voxels.reserve(tallies.size());
+  for (const CellTally& at : tallies) voxels.push_back(at.cell.voxel);
+  return voxels;
+}
+
+}  // namespace
+
+std::vector<CellTally> SiteModel::tally() const {
+  std::vector<CellTally> open;
+  for (std::size_t i = 0; i < cells_.size(); ++i)
+    if (!excluded_[i] && planner_map().at(cells_[i].voxel) == planning::VoxelState::seen_empty)
+      open.push_back({cells_[i], 0});
+  const std::vector<std::uint32_t> counts = planning::tally(
+      planner_map(), worth_seeing(), voxels_of(open), view_limits(config_.robot.scanner), threads_);
+  for (std::size_t i = 0; i < open.size(); ++i) open[i].voxels = counts[i];
+  return open;
+}
+
+std::vector<NextView> SiteModel::next_views() {
+  last_tally_ = tally();
+  std::vector<std::uint32_t> thin(last_tally_.size());
+  if (density_.is_set())
+    thin = planning::tally(planner_map(), density_.thin(), voxels_of(last_tally_),
+                           density_.limits(), threads_);
   best_voxels_ = 0;
   std::vector<NextView> views;
-  for (std::size_t i = 0; i < open.size(); ++i) {
-    best_voxels_ = std::max<std::uint64_t>(best_voxels_, counts[i]);
-    if (counts[i] < static_cast<std::uint32_t>(config_.phase2.gain_min_voxels) || counts[i] == 0)
-      continue;
-    const ViewCell& cell = cells_[open[i]];
+  for (std::size_t i = 0; i < last_tally_.size(); ++i) {
+    const ViewCell& cell = last_tally_[i].cell;
+    const std::uint32_t voxels = last_tally_[i].voxels + thin[i];
+    best_voxels_ = std::max<std::uint64_t>(best_voxels_, voxels);
+    if (voxels < static_cast<std::uint32_t>(config_.phase2.gain_min_voxels)) continue;
     views.push_back({.cell = cell,
                      .pose = {cell_position_m(cell).head<2>(), 0},
                      .ground_z_m = tasks_[static_cast<std::size_t>(cell.task)].area.ground_z_m,
-                     .voxels = counts[i]});
+                     .voxels = voxels});
   }
   std::ranges::stable_sort(views, std::ranges::greater{}, &NextView::voxels);
+  return views;
+}
+
+std::vector<ViewAhead> SiteModel::views_ahead(const std::vector<CellTally>& tallies,
+                                              std::size_t count) const {
+  std::vector<std::uint32_t> counts;
+  for (const CellTally& at : tallies) counts.push_back(at.voxels);
+  std::vector<ViewAhead> views;
+  for (const planning::PlannedView& view :
+       planning::next_views(planner_map(), worth_seeing(), voxels_of(tallies), counts,
+                            view_limits(config_.robot.scanner),
+                            {.views_max = count, .adds_min_voxels = 1, .threads = threads_}))
+    views.push_back({tallies[view.candidate].cell, view.sees_voxels, view.adds_voxels});
   return views;
 }
 
@@ -287,10 +316,11 @@ void SiteModel::expect(const NextView& view) {
   for (const std::uint32_t i : planning::visible_from(planner_map(), worth, view.cell.voxel,
                                                       view_limits(config_.robot.scanner)))
     expected_.push_back(worth[i].v);
+  density_.expect(planner_map(), view.cell.voxel);
 }
 
 std::uint64_t SiteModel::settle() {
-  std::uint64_t resolved = 0;
+  std::uint64_t resolved = density_.settle();
   for (const planning::Voxel& v : expected_) {
     if (map_.at(v) != planning::VoxelState::unseen) {
       ++resolved;

@@ -8,10 +8,11 @@
 #include <vector>
 
 #include "mission/config.hpp"
+#include "mission/density_goal.hpp"
 #include "mission/plan.hpp"
 #include "mission/record.hpp"
 #include "nav/raster.hpp"
-#include "planning/next_best_view.hpp"
+#include "planning/next_views.hpp"
 #include "planning/voxel_foliage.hpp"
 #include "planning/voxel_map.hpp"
 
@@ -29,12 +30,24 @@ struct ViewCell {
   int task{};             // Index into the tasks.
 };
 
+struct CellTally {
+  ViewCell cell;
+  std::uint32_t voxels{};
+};
+
 // A possible next view and how many boundary unseen voxels it counts.
 struct NextView {
   ViewCell cell;
   hal::Pose2 pose;
   double ground_z_m{};
-  std::uint32_t voxels{};
+  std::uint32_t voxels{};  // With a density goal: and surface voxels that it would bring there.
+};
+
+// One of several views to come.
+struct ViewAhead {
+  ViewCell cell;
+  std::uint32_t sees_voxels{};
+  std::uint32_t adds_voxels{};  // Seen by none of those before it.
 };
 
 // What one scan did to the model.
@@ -57,10 +70,19 @@ class SiteModel {
   ScanEffect add(const hal::ScanCloud& scan, const std::vector<Eigen::Vector3f>& W_points_m,
                  const Eigen::Isometry3d& T_W_S, double ground_z_m);
 
+  // Every cell that a view may be asked for, and how many boundary unseen voxels it counts.
+  std::vector<CellTally> tally() const;
+
   // Candidates by gain, best first, ties to the lowest index; those below the threshold are left
   // out. Empty: no view would add enough. best_voxels() tells the maximum all the same.
   std::vector<NextView> next_views();
   std::uint64_t best_voxels() const { return best_voxels_; }
+
+  // The next `count` views at once, threshold and density aside (planning::next_views); `tallies`
+  // is tally(), last_tally() that of next_views().
+  std::vector<ViewAhead> views_ahead(const std::vector<CellTally>& tallies,
+                                     std::size_t count) const;
+  const std::vector<CellTally>& last_tally() const { return last_tally_; }
 
   // Takes note that a view is about to be taken at the cell: what it should resolve.
   void expect(const NextView& view);
@@ -73,6 +95,9 @@ class SiteModel {
   void exclude(const planning::Voxel& cell);
 
   VoxelCounts counts() const;
+  // Whether any view could still help, and what none can see (site_leftover.cpp). Several tallies.
+  Leftover leftover() const;
+  DensityFacts density() const { return density_.facts(); }
   // Grows in z when at least kReturnsToGrow points lie in a layer above the box or higher, up to
   // [phase2] height_max_m. What is then in it, and everything derived from it, is as if the box had
   // been this high from the start.
@@ -97,6 +122,8 @@ class SiteModel {
   int grow(const planning::InsertReport& report);
   void look_through();
   void find_boundary();
+  bool is_in_site(const planning::Voxel& v) const;
+  bool is_set_aside(const planning::Voxel& v) const;
   std::vector<planning::BoundaryVoxel> worth_seeing() const;
   void note_obstacle(const Eigen::Vector3f& W_point_m, double ground_z_m, ScanEffect& effect);
 
@@ -115,6 +142,8 @@ class SiteModel {
   std::optional<planning::BeamCounts> beams_;      // Only for [phase2] foliage.
   std::optional<planning::VoxelMap> see_through_;  // The same.
   std::vector<planning::Voxel> expected_;
+  DensityGoal density_;
+  std::vector<CellTally> last_tally_;
   std::uint64_t best_voxels_{};
   std::uint64_t set_aside_{};
 

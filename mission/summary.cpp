@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "mission/json_text.hpp"
+#include "mission/leftover.hpp"
 #include "mission/report_facts.hpp"
 
 namespace mission {
@@ -207,6 +208,8 @@ json::object summarise(const RunRecord& record, const ProductFacts& products) {
   summary["coverage"] = coverage_json(record);
   summary["voxels"] =
       record.scans.empty() ? json::value(nullptr) : voxels_json(record.scans.back().after);
+  summary["leftover"] = leftover_json(record);
+  summary["density"] = density_json(record.density);
   json::array scans;
   for (std::size_t i = 0; i < record.scans.size(); ++i) scans.push_back(scan_json(record, i));
   summary["scans"] = std::move(scans);

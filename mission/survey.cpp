@@ -12,10 +12,6 @@ namespace {
 
 namespace json = boost::json;
 
-json::array point_json(const Eigen::Vector2d& p) {
-  return {p.x(), p.y()};
-}
-
 json::object pose_json(const hal::Pose2& pose) {
   return {{"x_m", pose.position_m.x()},
           {"y_m", pose.position_m.y()},
@@ -195,8 +191,8 @@ hal::Task<void> Survey::tour(std::size_t t) {
 }
 
 hal::Task<void> Survey::refine() {
-  for (int taken = 0; taken < config_.phase2.views_max;) {
-    const std::vector<NextView> views = choose_views();
+  for (int taken = 0; taken < config_.phase2.views_max; views_taken_ = ++taken) {
+    std::vector<NextView> views = choose_views();
     if (views.empty()) {
       record_.end = fmt::format(
           "no next best view would see {} or more unseen voxels (the best sees {}){}",
@@ -204,42 +200,32 @@ hal::Task<void> Survey::refine() {
           model_.set_aside()
               ? fmt::format("; {} voxels stayed unseen after two tries each", model_.set_aside())
               : "");
+      note_leftover(true);
       co_return;
     }
     // The best that can be reached; the others stay excluded.
     bool done = false;
-    for (std::size_t i = 0; i < views.size() && !done; ++i) {
-      model_.exclude(views[i].cell.voxel);
+    while (!done) {
+      const auto chosen = choose_view(views);
+      if (!chosen) break;
+      const NextView view = views[*chosen];
+      views.erase(views.begin() + static_cast<std::ptrdiff_t>(*chosen));
+      model_.exclude(view.cell.voxel);
       const Stop stop{.name = fmt::format("NBV {}", taken + 1),
-                      .task = views[i].cell.task,
-                      .pose = views[i].pose,
+                      .task = view.cell.task,
+                      .pose = view.pose,
                       .station = nullptr,
-                      .view = &views[i]};
+                      .view = &view};
       done = co_await visit(stop);
     }
     if (!done) {
       record_.end = "none of the views that would add enough can be reached";
+      note_leftover(false);
       co_return;
     }
-    views_taken_ = ++taken;
   }
   record_.end = fmt::format("took views_max = {} next best views", config_.phase2.views_max);
-}
-
-std::vector<NextView> Survey::choose_views() {
-  std::vector<NextView> views = model_.next_views();
-  if (!record_.scans.empty()) record_.scans.back().visible_to_next = model_.best_voxels();
-  json::object decision{{"t_s", now_s()},
-                        {"decision", "next_best_view"},
-                        {"best_voxels", model_.best_voxels()},
-                        {"gain_min_voxels", config_.phase2.gain_min_voxels},
-                        {"views_above", views.size()}};
-  if (!views.empty()) {
-    decision["area"] = task(views.front().cell.task).area.name;
-    decision["at_m"] = point_json(views.front().pose.position_m);
-  }
-  decide(std::move(decision));
-  return views;
+  note_leftover(false);
 }
 
 // Goes to the stop by robot or by hand and scans. False: dropped, with the reason on record.
