@@ -50,6 +50,29 @@ class BoxTree {
     }
   }
 
+  // Calls visit(item) for all items but those in boxes that hidden(box) is true of, those nearest
+  // to the point first by rule of thumb. hidden() is asked of boxes of many items and may answer
+  // differently as visits go on.
+  template <class Hidden, class Visit>
+  void from_near(const Eigen::Vector2d& point, Hidden&& hidden, Visit&& visit) const {
+    std::array<int, 64> stack{};
+    int depth = 0;
+    if (!nodes_.empty()) stack[static_cast<std::size_t>(depth++)] = 0;
+    while (depth > 0) {
+      const Node& node = nodes_[static_cast<std::size_t>(stack[static_cast<std::size_t>(--depth)])];
+      if (hidden(node.box)) continue;
+      if (node.count == 0) {
+        const bool left_first = box_distance_squared(point, child(node.first)) <=
+                                box_distance_squared(point, child(node.first + 1));
+        stack[static_cast<std::size_t>(depth++)] = left_first ? node.first + 1 : node.first;
+        stack[static_cast<std::size_t>(depth++)] = left_first ? node.first : node.first + 1;
+        continue;
+      }
+      for (int i = node.first; i < node.first + node.count; ++i)
+        visit(items_[static_cast<std::size_t>(i)]);
+    }
+  }
+
   struct Found {
     int item = -1;
     double distance = std::numeric_limits<double>::infinity();

@@ -6,6 +6,7 @@
 #include <map>
 #include <numeric>
 
+#include "planning/sight_horizon.hpp"
 #include "planning/sight_sweep.hpp"
 
 namespace planning {
@@ -83,6 +84,11 @@ void subtract(const ShareRange& hidden, std::vector<SharePiece>& pieces, std::si
       pieces.end());
 }
 
+// From the origin.
+double distance_squared(const nav::Box2& box) {
+  return box.min.cwiseMax(-box.max).cwiseMax(0.0).squaredNorm();
+}
+
 }  // namespace
 
 bool operator<(Share s, Share t) {
@@ -128,28 +134,33 @@ Sight::Sight(const std::vector<Wall>& walls) : walls_(walls), is_tangled_(tangle
   tree_ = nav::BoxTree(boxes);
 }
 
-std::vector<int> Sight::near(PointMm v, double reach_mm) const {
-  std::vector<int> found;
+bool Sight::gather(PointMm v, double reach_mm, std::vector<SightEdge>& clear,
+                   std::vector<SightEdge>& tangled) const {
   const Eigen::Vector2d at(static_cast<double>(v.x), static_cast<double>(v.y));
-  tree_.near({at, at}, reach_mm, [&](int wall) {
-    found.push_back(wall);
-    return reach_mm;
+  Horizon horizon;
+  bool on_wall = false;
+  const auto hidden = [&](const nav::Box2& box) {
+    const nav::Box2 relative{box.min - at, box.max - at};
+    return distance_squared(relative) > reach_mm * reach_mm || horizon.hides(relative);
+  };
+  tree_.from_near(at, hidden, [&](int i) {
+    const Wall& wall = walls_[static_cast<std::size_t>(i)];
+    const PointMm a = wall.a - v, b = wall.b - v;
+    const std::int64_t turn = nav::cross(a, b);
+    if (turn == 0) {
+      if (wall.a != wall.b && nav::dot(a, b) <= 0) on_wall = true;
+      return;
+    }
+    const SightEdge edge{turn < 0 ? b : a, turn < 0 ? a : b, i, turn < 0 && wall.target};
+    if (!horizon.hides_or_adds(edge))
+      (is_tangled_[static_cast<std::size_t>(i)] ? tangled : clear).push_back(edge);
   });
-  return found;
+  return !on_wall;
 }
 
 std::vector<SharePiece> Sight::from(PointMm v, double reach_mm) const {
   std::vector<SightEdge> clear, tangled;
-  for (const int i : near(v, reach_mm)) {
-    const Wall& wall = walls_[static_cast<std::size_t>(i)];
-    if (wall.a == wall.b) continue;
-    const PointMm a = wall.a - v, b = wall.b - v;
-    const std::int64_t turn = nav::cross(a, b);
-    if (turn == 0 && nav::dot(a, b) <= 0) return {};  // The viewpoint is on the wall.
-    if (turn == 0) continue;
-    const SightEdge edge{turn < 0 ? b : a, turn < 0 ? a : b, i, turn < 0 && wall.target};
-    (is_tangled_[static_cast<std::size_t>(i)] ? tangled : clear).push_back(edge);
-  }
+  if (!gather(v, reach_mm, clear, tangled)) return {};
 
   std::vector<SharePiece> pieces;
   sweep(clear, [&](const SightEdge& edge, PointMm begin, PointMm end) {

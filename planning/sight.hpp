@@ -53,6 +53,8 @@ struct SharePiece {
   Share from, to;
 };
 
+struct SightEdge;
+
 class Sight {
  public:
   // Walls without length are ignored.
@@ -66,7 +68,9 @@ class Sight {
   const std::vector<int>& tangled() const { return tangled_; }
 
  private:
-  std::vector<int> near(nav::PointMm v, double reach_mm) const;
+  // The walls within reach of v, nearly, that are not wholly hidden, nearly; false if v is on one.
+  bool gather(nav::PointMm v, double reach_mm, std::vector<SightEdge>& clear,
+              std::vector<SightEdge>& tangled) const;
 
   std::vector<Wall> walls_;
   nav::BoxTree tree_;

@@ -68,10 +68,13 @@ struct SightEvent {
   bool start{};
 };
 
-inline double angle_key(nav::PointMm d) {
-  const auto x = static_cast<double>(d.x), y = static_cast<double>(d.y);
+// In [0, 4]: a quarter of the way round is 1.
+inline double angle_key(double x, double y) {
   const double share = x / (std::abs(x) + std::abs(y));
-  return half_plane(d) == 0 ? 1 - share : 3 + share;
+  return y > 0 || (y == 0 && x > 0) ? 1 - share : 3 + share;
+}
+inline double angle_key(nav::PointMm d) {
+  return angle_key(static_cast<double>(d.x), static_cast<double>(d.y));
 }
 
 // Both ends of every edge, by angle; exact.
