@@ -67,6 +67,15 @@ class Roadmap {
   Eigen::MatrixXd lengths_m(const std::vector<Eigen::Vector2d>& points_m,
                             Smoothing smoothing = Smoothing::shortcut) const;
 
+  // The shortest way along the roads that are not blocked, from node to node of graph(). A* heads
+  // for the goal, Dijkstra looks all round: the same length, for more nodes searched.
+  enum class Search { a_star, dijkstra };
+  struct AlongRoads {
+    double length_m = std::numeric_limits<double>::infinity();  // Infinite: there is none.
+    int nodes_searched{};
+  };
+  AlongRoads along_roads(int from_node, int to_node, Search search = Search::a_star) const;
+
   // Distance to the nearest outline or block; 0 inside a block. Says nothing of inside or outside.
   double clearance_m(const Eigen::Vector2d& point_m) const;
 
@@ -146,6 +155,7 @@ class Roadmap {
   std::optional<Eigen::Vector2d> climb(const Eigen::Vector2d& point_m) const;
 
   NoRoute check_ends(const Eigen::Vector2d& from_m, const Eigen::Vector2d& to_m) const;
+  Link link_at_node(int node) const;
   Tree search(const std::vector<Link>& starts, const std::vector<Link>& goals,
               const Eigen::Vector2d* to_m) const;
   std::optional<std::vector<Eigen::Vector2d>> trace(const Tree& tree,

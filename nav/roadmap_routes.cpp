@@ -29,6 +29,7 @@ struct Roadmap::Tree {
   std::vector<double> length_m;  // To each node; infinite where not reached.
   std::vector<int> parent;       // Node before it; -1 where a link from the start ends.
   std::vector<int> link;         // That link, else -1.
+  int nodes_searched = 0;
 };
 
 std::vector<int> Roadmap::nearest_edges(const Vector2d& point_m, int count) const {
@@ -108,12 +109,13 @@ NoRoute Roadmap::check_ends(const Vector2d& from_m, const Vector2d& to_m) const 
   return to_clearance_m < limit_m() ? NoRoute::to_too_close : NoRoute::none;
 }
 
-// A* towards to_m, or Dijkstra to every node where that is null. Ties: lowest node first.
+// A* towards to_m, or Dijkstra where that is null; ends when no shorter way to a goal is left, so
+// without goals it reaches every node. Ties: lowest node first.
 Roadmap::Tree Roadmap::search(const std::vector<Link>& starts, const std::vector<Link>& goals,
                               const Vector2d* to_m) const {
   const std::size_t nodes = fixed_->axis.nodes_m.size();
   Tree tree{std::vector<double>(nodes, kInfinity), std::vector<int>(nodes, -1),
-            std::vector<int>(nodes, -1)};
+            std::vector<int>(nodes, -1), 0};
   using Entry = std::tuple<double, double, int>;  // Estimate through the node, length to it, node.
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
   const auto reach = [&](int node, double length_m, int parent, int link) {
@@ -145,7 +147,8 @@ Roadmap::Tree Roadmap::search(const std::vector<Link>& starts, const std::vector
     const auto [estimate_m, length_m, node] = open.top();
     open.pop();
     if (length_m > at(tree.length_m, node)) continue;
-    if (to_m != nullptr && estimate_m >= best_m) break;
+    if (estimate_m >= best_m) break;
+    ++tree.nodes_searched;
     for (auto exit = std::lower_bound(exits.begin(), exits.end(), std::pair(node, 0.0));
          exit != exits.end() && exit->first == node; ++exit)
       best_m = std::min(best_m, length_m + exit->second);
@@ -156,6 +159,29 @@ Roadmap::Tree Roadmap::search(const std::vector<Link>& starts, const std::vector
     }
   }
   return tree;
+}
+
+// To nowhere: the foot is the node itself. The node has an edge that is not blocked.
+Roadmap::Link Roadmap::link_at_node(int node) const {
+  int h = at(fixed_->first_half_edge, node);
+  while (edge_blocked(at(fixed_->half_edges, h).edge)) ++h;
+  const HalfEdge& half = at(fixed_->half_edges, h);
+  const bool at_start = at(fixed_->axis.edges, half.edge).a == node;
+  return {{at(fixed_->axis.nodes_m, node)}, 0, half.edge, at_start ? 0 : half.length_m};
+}
+
+Roadmap::AlongRoads Roadmap::along_roads(int from_node, int to_node, Search search) const {
+  const auto cut_off = [&](int node) {
+    for (int h = at(fixed_->first_half_edge, node); h < at(fixed_->first_half_edge, node + 1); ++h)
+      if (!edge_blocked(at(fixed_->half_edges, h).edge)) return false;
+    return true;
+  };
+  if (from_node == to_node) return {0, 0};
+  if (cut_off(from_node) || cut_off(to_node)) return {};
+  const Vector2d& to_m = at(fixed_->axis.nodes_m, to_node);
+  const Tree tree = this->search({link_at_node(from_node)}, {link_at_node(to_node)},
+                                 search == Search::a_star ? &to_m : nullptr);
+  return {at(tree.length_m, to_node), tree.nodes_searched};
 }
 
 // The shortest way that ends with one of the goal's links.

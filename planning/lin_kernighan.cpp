@@ -14,6 +14,7 @@ constexpr std::array<int, 3> kBreadth = {5, 3,
 constexpr double kGainMin = 1e-9;
 constexpr int kKickSpan = 50;  // A kick swaps two neighbouring runs this long together at most.
 constexpr int kSegmentMax = 3;
+constexpr int kStartsMax = 120;
 
 using Order = std::vector<int>;
 
@@ -318,8 +319,9 @@ std::vector<int> lin_kernighan(const SymmetricCosts& cost, int kicks_per_node, s
   Search search(cost);
   Order best;
   double least = 0;
-  for (int start = 0; start < cost.n; ++start) {
-    search.set(nearest_neighbour(cost, start));
+  const int starts = std::min(cost.n, kStartsMax);
+  for (int k = 0; k < starts; ++k) {
+    search.set(nearest_neighbour(cost, k * cost.n / starts));
     search.improve_all();
     const double total = search.total();
     if (!best.empty() && total >= least - kGainMin) continue;

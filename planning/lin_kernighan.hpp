@@ -18,8 +18,9 @@ struct SymmetricCosts {
   }
 };
 
-// A short closed tour of n >= 8 nodes: nearest neighbour from every node, local search on each,
-// then kicks_per_node * n perturbations (double bridges) of the best. Deterministic.
+// A short closed tour of n >= 8 nodes: nearest neighbour from every node (from 120 of them if there
+// are more), local search on each, then kicks_per_node * n perturbations (double bridges) of the
+// best. Deterministic.
 std::vector<int> lin_kernighan(const SymmetricCosts& cost, int kicks_per_node, std::uint64_t seed);
 
 }  // namespace planning

@@ -1,6 +1,8 @@
 #include "planning/tour.hpp"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -64,35 +66,51 @@ class Costs {
 };
 
 // Held and Karp (1962): best[set][last] is the cheapest way from the start through the set that
-// ends in `last`. Nodes 1 .. n-1 are bits 0 .. n-2. O(2^n n^2).
+// ends in `last`; infinite where last is not in the set. Nodes 1 .. n-1 are bits 0 .. n-2.
+// O(2^n n^2).
 class HeldKarp {
  public:
-  explicit HeldKarp(const Costs& cost) : cost_(cost), others_(cost.size() - 1) {}
+  explicit HeldKarp(const Costs& cost)
+      : cost_(cost), others_(cost.size() - 1), width_((others_ + kLanes - 1) / kLanes * kLanes) {
+    into_.assign(at(width_ * others_), kInfinity);
+    for (int last = 0; last < others_; ++last)
+      for (int before = 0; before < others_; ++before)
+        into_[at(last * width_ + before)] = cost_(before + 1, last + 1);
+  }
 
   Order solve() {
     const std::size_t sets = std::size_t{1} << others_;
-    best_.assign(sets * static_cast<std::size_t>(others_), kInfinity);
-    for (int last = 0; last < others_; ++last) best(bit(last), last) = cost_(0, last + 1);
-    for (std::size_t set = 1; set < sets; ++set)
-      for (int last = 0; last < others_; ++last)
-        if (set & bit(last)) extend(set, last);
+    best_.assign(sets * at(others_) + kLanes, kInfinity);
+    for (int last = 0; last < others_; ++last) row(bit(last))[last] = cost_(0, last + 1);
+    for (std::size_t set = 1; set < sets; ++set) {
+      if (std::has_single_bit(set)) continue;
+      for (std::size_t left = set; left != 0; left &= left - 1) {
+        const int last = std::countr_zero(left);
+        row(set)[last] = cheapest_into(last, row(set & ~bit(last)));
+      }
+    }
     return trace(sets - 1);
   }
 
  private:
-  static std::size_t bit(int node) { return std::size_t{1} << node; }
-  double& best(std::size_t set, int last) {
-    return best_[set * static_cast<std::size_t>(others_) + static_cast<std::size_t>(last)];
-  }
+  static constexpr int kLanes = 4;  // Side by side, so that they become vector instructions.
 
-  void extend(std::size_t set, int last) {
-    const double here = best(set, last);
-    if (here == kInfinity) return;
-    for (int next = 0; next < others_; ++next) {
-      if (set & bit(next)) continue;
-      double& known = best(set | bit(next), next);
-      known = std::min(known, here + cost_(last + 1, next + 1));
-    }
+  static std::size_t at(int i) { return static_cast<std::size_t>(i); }
+  static std::size_t bit(int node) { return std::size_t{1} << node; }
+  double* row(std::size_t set) { return best_.data() + set * at(others_); }
+
+  // Of the ways that `ways` holds by their last node, each gone on to `last`. (Beyond the row's end
+  // other sets are read, but into_ is infinite there.)
+  double cheapest_into(int last, const double* ways) const {
+    const double* into = into_.data() + last * width_;
+    std::array<double, kLanes> least;
+    least.fill(kInfinity);
+    for (int before = 0; before < width_; before += kLanes)
+      for (int lane = 0; lane < kLanes; ++lane) {
+        const double total = ways[before + lane] + into[before + lane];
+        least[at(lane)] = total < least[at(lane)] ? total : least[at(lane)];
+      }
+    return std::min({least[0], least[1], least[2], least[3]});
   }
 
   Order trace(std::size_t set) {
@@ -103,7 +121,7 @@ class HeldKarp {
       double least = kInfinity;
       for (int last = 0; last < others_; ++last) {
         if (!(set & bit(last))) continue;
-        const double total = best(set, last) + cost_(last + 1, next + 1);
+        const double total = row(set)[last] + cost_(last + 1, next + 1);
         if (chosen < 0 || total < least) {
           least = total;
           chosen = last;
@@ -120,6 +138,8 @@ class HeldKarp {
 
   const Costs& cost_;
   const int others_;
+  const int width_;           // others_ rounded up to whole lanes.
+  std::vector<double> into_;  // Row last, column before; infinite beyond the others.
   std::vector<double> best_;
 };
 

@@ -8,6 +8,7 @@
 #include "mission/check_report.hpp"
 #include "mission/config_schema.hpp"
 #include "mission/json_text.hpp"
+#include "tools/vantage_tour.hpp"
 
 namespace {
 
@@ -40,6 +41,7 @@ int main(int argc, char** argv) {
       "Examples:\n"
       "  vantage check configs/missions/fort.toml\n"
       "  vantage check configs/missions/any_site.toml --site path/to/folder --json\n"
+      "  vantage tour pcb442.tsp --json\n"
       "  vantage keys | less\n"
       "Exit: 0 fine, 2 not fine (every reason is on stderr, one a line).");
   app.require_subcommand(1);
@@ -55,9 +57,12 @@ int main(int argc, char** argv) {
   check_command->add_flag("--json", options.json, "Report as JSON on stdout, errors too");
   auto* keys_command =
       app.add_subcommand("keys", "Prints every key with its range, default and meaning (Markdown)");
+  std::function<int()> run;
+  vantage::add_tour_command(app, run);
 
   try {
     app.parse(argc, argv);
+    if (run) return run();
     if (*keys_command) {
       fmt::print("{}", mission::config_reference());
       return kFine;

@@ -1,5 +1,8 @@
-// Roadmap: building it and finding routes, on made-up sites of about 1,000 and 10,000 edges.
+// Roadmap: building it and finding routes, on made-up sites of about 1,000 and 10,000 edges. In the
+// same run the paper's way of building (points on the outlines) and Dijkstra's search.
 #include <benchmark/benchmark.h>
+
+#include <boost/polygon/voronoi.hpp>
 
 #include "nav/medial_axis.hpp"
 #include "nav/polygons.hpp"
@@ -9,13 +12,13 @@
 namespace {
 
 constexpr double kRadiusM = 0.5;
+constexpr int kSmall = 150, kLarge = 1700;  // Obstacles; 100 come to about 600 edges.
 
 struct Site {
   double side_m;
   nav::FreeArea area;
 };
 
-// 100 obstacles come to about 700 edges.
 const Site& site(int obstacles) {
   static const auto make = [](int count) {
     support::Dice dice(1);
@@ -23,9 +26,9 @@ const Site& site(int obstacles) {
     const support::SiteSize size{side_m, count, 10, 12};
     return Site{side_m, support::random_area(dice, size, kRadiusM)};
   };
-  static const Site small = make(150);
-  static const Site large = make(1700);
-  return obstacles == 150 ? small : large;
+  static const Site small = make(kSmall);
+  static const Site large = make(kLarge);
+  return obstacles == kSmall ? small : large;
 }
 
 void count_edges(benchmark::State& state, const Site& s) {
@@ -40,31 +43,88 @@ std::vector<Eigen::Vector2d> stations(const Site& s, int count) {
   return points;
 }
 
-void BM_RoadmapBuild(benchmark::State& state) {
+void roadmap_build(benchmark::State& state) {
   const Site& s = site(static_cast<int>(state.range(0)));
   for (auto _ : state) benchmark::DoNotOptimize(nav::Roadmap::build(s.area, kRadiusM));
   count_edges(state, s);
-  state.counters["roads"] =
-      static_cast<double>(nav::Roadmap::build(s.area, kRadiusM).polylines().size());
 }
-BENCHMARK(BM_RoadmapBuild)->Arg(150)->Arg(1700)->Unit(benchmark::kMillisecond);
+BENCHMARK(roadmap_build)->Arg(kSmall)->Arg(kLarge)->Unit(benchmark::kMillisecond);
 
-void BM_MedialAxis(benchmark::State& state) {
+// The paper's way: a point every 0.1 m on the outlines and the diagram of the points. Only the
+// diagram is timed; dropping what lies in obstacles or is too narrow would come on top.
+void roadmap_build_by_points(benchmark::State& state) {
+  constexpr double kStepM = 0.1;
+  const Site& s = site(static_cast<int>(state.range(0)));
+  std::vector<boost::polygon::point_data<std::int32_t>> points;
+  for (const nav::SegmentMm& e : nav::edges(s.area.drivable)) {
+    const int pieces = std::max(1, static_cast<int>(std::ceil(nav::length_m(e.a, e.b) / kStepM)));
+    for (int k = 0; k < pieces; ++k) {
+      const nav::PointMm p =
+          nav::to_mm(nav::to_m(e.a) + (nav::to_m(e.b) - nav::to_m(e.a)) * k / pieces);
+      points.emplace_back(static_cast<std::int32_t>(p.x), static_cast<std::int32_t>(p.y));
+    }
+  }
+  for (auto _ : state) {
+    boost::polygon::voronoi_diagram<double> diagram;
+    boost::polygon::construct_voronoi(points.begin(), points.end(), &diagram);
+    benchmark::DoNotOptimize(diagram);
+  }
+  count_edges(state, s);
+  state.counters["points"] = static_cast<double>(points.size());
+}
+BENCHMARK(roadmap_build_by_points)->Arg(kSmall)->Arg(kLarge)->Unit(benchmark::kMillisecond);
+
+void medial_axis(benchmark::State& state) {
   const Site& s = site(static_cast<int>(state.range(0)));
   for (auto _ : state) benchmark::DoNotOptimize(nav::medial_axis(s.area.drivable, {}));
   count_edges(state, s);
 }
-BENCHMARK(BM_MedialAxis)->Arg(150)->Arg(1700)->Unit(benchmark::kMillisecond);
+BENCHMARK(medial_axis)->Arg(kSmall)->Arg(kLarge)->Unit(benchmark::kMillisecond);
 
-void BM_Noding(benchmark::State& state) {
+void noding(benchmark::State& state) {
   const Site& s = site(static_cast<int>(state.range(0)));
   const auto outline = nav::edges(s.area.drivable);
   for (auto _ : state) benchmark::DoNotOptimize(nav::node_outlines(outline));
   count_edges(state, s);
 }
-BENCHMARK(BM_Noding)->Arg(150)->Arg(1700)->Unit(benchmark::kMillisecond);
+BENCHMARK(noding)->Arg(kSmall)->Arg(kLarge)->Unit(benchmark::kMillisecond);
 
-void BM_Route(benchmark::State& state) {
+// From node to node along the roads, the same pairs for both searches.
+void along_roads(benchmark::State& state, nav::Roadmap::Search search) {
+  const Site& s = site(static_cast<int>(state.range(0)));
+  const nav::Roadmap roadmap = nav::Roadmap::build(s.area, kRadiusM);
+  const int nodes = static_cast<int>(roadmap.graph().nodes_m.size());
+  support::Dice dice(4);
+  std::vector<std::pair<int, int>> pairs;
+  for (int i = 0; i < 100; ++i) pairs.emplace_back(dice.below(nodes), dice.below(nodes));
+  std::size_t i = 0;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(roadmap.along_roads(pairs[i].first, pairs[i].second, search));
+    i = (i + 1) % pairs.size();
+  }
+  double searched = 0, length_m = 0;
+  for (const auto& [from, to] : pairs) {
+    const auto found = roadmap.along_roads(from, to, search);
+    searched += found.nodes_searched;
+    if (std::isfinite(found.length_m)) length_m += found.length_m;
+  }
+  state.counters["nodes_searched"] = searched / static_cast<double>(pairs.size());
+  state.counters["length_m"] = length_m / static_cast<double>(pairs.size());
+}
+void along_roads(benchmark::State& state) {
+  along_roads(state, nav::Roadmap::Search::a_star);
+}
+void along_roads_by_dijkstra(benchmark::State& state) {
+  along_roads(state, nav::Roadmap::Search::dijkstra);
+}
+BENCHMARK(static_cast<void (*)(benchmark::State&)>(along_roads))
+    ->Name("along_roads")
+    ->Arg(kSmall)
+    ->Arg(kLarge)
+    ->Unit(benchmark::kMicrosecond);
+BENCHMARK(along_roads_by_dijkstra)->Arg(kSmall)->Arg(kLarge)->Unit(benchmark::kMicrosecond);
+
+void route(benchmark::State& state) {
   const Site& s = site(static_cast<int>(state.range(0)));
   const auto smoothing = state.range(1) == 0 ? nav::Smoothing::none : nav::Smoothing::shortcut;
   const nav::Roadmap roadmap = nav::Roadmap::build(s.area, kRadiusM);
@@ -76,27 +136,46 @@ void BM_Route(benchmark::State& state) {
     ++i;
   }
 }
-BENCHMARK(BM_Route)->ArgsProduct({{150, 1700}, {0, 1}})->Unit(benchmark::kMillisecond);
+BENCHMARK(route)->ArgsProduct({{kSmall, kLarge}, {0, 1}})->Unit(benchmark::kMillisecond);
 
-void BM_AllPairsOf26(benchmark::State& state) {
-  const Site& s = site(150);
+void all_pairs_of_26(benchmark::State& state) {
+  const Site& s = site(kSmall);
   const auto smoothing = state.range(0) == 0 ? nav::Smoothing::none : nav::Smoothing::shortcut;
   const nav::Roadmap roadmap = nav::Roadmap::build(s.area, kRadiusM);
   const auto points = stations(s, 26);
   for (auto _ : state) benchmark::DoNotOptimize(roadmap.lengths_m(points, smoothing));
 }
-BENCHMARK(BM_AllPairsOf26)->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
+BENCHMARK(all_pairs_of_26)->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
 
-void BM_BlockAThousandCells(benchmark::State& state) {
-  const Site& s = site(150);
-  const nav::Roadmap clean = nav::Roadmap::build(s.area, kRadiusM);
+// An obstacle found underway closes roads; the reference makes the roadmap anew.
+void block(benchmark::State& state) {
+  const Site& s = site(static_cast<int>(state.range(0)));
+  nav::Roadmap roadmap = nav::Roadmap::build(s.area, kRadiusM);
   const auto points = stations(s, 1000);
+  std::size_t i = 0;
   for (auto _ : state) {
-    nav::Roadmap roadmap = clean;
-    for (const auto& p : points) roadmap.block_cell(p, p + Eigen::Vector2d(1, 1));
-    benchmark::DoNotOptimize(roadmap);
+    if (i == points.size()) {
+      state.PauseTiming();
+      roadmap.unblock_all();
+      i = 0;
+      state.ResumeTiming();
+    }
+    roadmap.block_cell(points[i], points[i] + Eigen::Vector2d(1, 1));
+    ++i;
   }
 }
-BENCHMARK(BM_BlockAThousandCells)->Unit(benchmark::kMillisecond);
+void block_by_rebuilding(benchmark::State& state) {
+  const Site& s = site(static_cast<int>(state.range(0)));
+  const auto points = stations(s, 1000);
+  std::size_t i = 0;
+  for (auto _ : state) {
+    nav::Roadmap roadmap = nav::Roadmap::build(s.area, kRadiusM);
+    roadmap.block_cell(points[i], points[i] + Eigen::Vector2d(1, 1));
+    benchmark::DoNotOptimize(roadmap);
+    i = (i + 1) % points.size();
+  }
+}
+BENCHMARK(block)->Arg(kSmall)->Arg(kLarge)->Unit(benchmark::kMicrosecond);
+BENCHMARK(block_by_rebuilding)->Arg(kSmall)->Arg(kLarge)->Unit(benchmark::kMicrosecond);
 
 }  // namespace

@@ -1,11 +1,15 @@
-// Tours: the exact method by number of nodes, and the search on random stations and TSPLIB.
+// Tours: the exact method by number of nodes beside trying every order, and the search on random
+// stations and TSPLIB beside going on to the nearest.
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <numeric>
 
 #include "planning/tour.hpp"
 #include "tests/support/random_site.hpp"
-#include "tests/support/tsplib.hpp"
+#include "tests/support/tsplib_optima.hpp"
 
 namespace {
 
@@ -22,33 +26,77 @@ planning::TourProblem random_problem(int n, bool symmetric) {
   return problem;
 }
 
-void BM_HeldKarp(benchmark::State& state) {
+void tour_exact(benchmark::State& state) {
   const auto problem = random_problem(static_cast<int>(state.range(0)), true);
-  for (auto _ : state)
-    benchmark::DoNotOptimize(planning::solve_tour(problem, {.exact_nodes_max = 20}));
+  for (auto _ : state) benchmark::DoNotOptimize(planning::solve_tour(problem));
 }
-BENCHMARK(BM_HeldKarp)->Arg(10)->Arg(15)->Arg(18)->Arg(20)->Unit(benchmark::kMillisecond);
+void tour_exact_by_permutations(benchmark::State& state) {
+  const auto problem = random_problem(static_cast<int>(state.range(0)), true);
+  for (auto _ : state) {
+    std::vector<int> order(problem.cost.size());
+    std::iota(order.begin(), order.end(), 0);
+    double least = planning::tour_cost(problem, order);
+    while (std::next_permutation(order.begin() + 1, order.end()))
+      least = std::min(least, planning::tour_cost(problem, order));
+    benchmark::DoNotOptimize(least);
+  }
+}
+BENCHMARK(tour_exact)->Arg(10)->Arg(15)->Arg(18)->Arg(20)->Unit(benchmark::kMillisecond);
+BENCHMARK(tour_exact_by_permutations)->Arg(10)->Unit(benchmark::kMillisecond);
 
-void BM_TourSearch(benchmark::State& state) {
+// The search where the exact method can be its reference, in time and in length.
+void tour_search(benchmark::State& state) {
   const auto problem = random_problem(static_cast<int>(state.range(0)), state.range(1) != 0);
-  for (auto _ : state)
-    benchmark::DoNotOptimize(planning::solve_tour(problem, {.exact_nodes_max = 0}));
+  double cost = 0;
+  for (auto _ : state) cost = planning::solve_tour(problem, {.exact_nodes_max = 0}).cost;
+  state.counters["length"] = cost;
 }
-BENCHMARK(BM_TourSearch)->ArgsProduct({{16, 30, 100}, {0, 1}})->Unit(benchmark::kMillisecond);
+void tour_search_by_held_karp(benchmark::State& state) {
+  const auto problem = random_problem(static_cast<int>(state.range(0)), state.range(1) != 0);
+  double cost = 0;
+  for (auto _ : state) cost = planning::solve_tour(problem).cost;
+  state.counters["length"] = cost;
+}
+BENCHMARK(tour_search)->ArgsProduct({{16, 20, 30, 100}, {0, 1}})->Unit(benchmark::kMillisecond);
+BENCHMARK(tour_search_by_held_karp)->ArgsProduct({{16, 20}, {0, 1}})->Unit(benchmark::kMillisecond);
 
-void BM_Tsplib(benchmark::State& state, const std::string& name) {
+double nearest_neighbour(const planning::TourProblem& problem) {
+  std::vector<int> order(problem.cost.size());
+  std::iota(order.begin(), order.end(), 0);
+  for (auto last = order.begin(); last + 1 < order.end(); ++last) {
+    const auto& from = problem.cost[static_cast<std::size_t>(*last)];
+    std::iter_swap(last + 1, std::min_element(last + 1, order.end(), [&](int a, int b) {
+                     return from[static_cast<std::size_t>(a)] < from[static_cast<std::size_t>(b)];
+                   }));
+  }
+  return planning::tour_cost(problem, order);
+}
+
+template <class Solve>
+void tsplib(benchmark::State& state, const std::string& name, const Solve& solve) {
   const std::filesystem::path folder =
       std::filesystem::path(__FILE__).parent_path() / "../../../shared/data/bench/tsplib";
   if (!std::filesystem::exists(folder)) return state.SkipWithError("no TSPLIB instances");
   const auto problem = support::tsp_problem(folder / (name + ".tsp"));
   double cost = 0;
-  for (auto _ : state) cost = planning::solve_tour(problem).cost;
+  for (auto _ : state) cost = solve(problem);
   const double optimum = support::tsp_optima(folder / "optima.csv").at(name);
   state.counters["gap_percent"] = 100 * (cost / optimum - 1);
 }
-BENCHMARK_CAPTURE(BM_Tsplib, berlin52, std::string("berlin52"))->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(BM_Tsplib, kroA100, std::string("kroA100"))->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(BM_Tsplib, a280, std::string("a280"))->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(BM_Tsplib, pcb442, std::string("pcb442"))->Unit(benchmark::kMillisecond);
+
+[[maybe_unused]] const int kRegistered = [] {
+  for (const std::string name :
+       {"burma14", "ulysses16", "gr17", "bays29", "att48", "eil51", "berlin52", "st70", "eil76",
+        "pr76", "rat99", "kroA100", "lin105", "ch130", "pr226", "a280", "pcb442"}) {
+    benchmark::RegisterBenchmark(("tsplib/" + name).c_str(), [name](benchmark::State& state) {
+      tsplib(state, name, [](const auto& p) { return planning::solve_tour(p).cost; });
+    })->Unit(benchmark::kMillisecond);
+    benchmark::RegisterBenchmark(
+        ("tsplib_by_nearest/" + name).c_str(),
+        [name](benchmark::State& state) { tsplib(state, name, nearest_neighbour); })
+        ->Unit(benchmark::kMillisecond);
+  }
+  return 0;
+}();
 
 }  // namespace

@@ -3,14 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
+#include <ctime>
 #include <limits>
 #include <numeric>
 
 #include "planning/lin_kernighan.hpp"
 #include "tests/support/random_site.hpp"
-#include "tests/support/tsplib.hpp"
+#include "tests/support/tsplib_optima.hpp"
 
 namespace planning {
 namespace {
@@ -83,8 +83,8 @@ TEST(Tour, SearchFindsWhatHeldAndKarpProve) {
   int optimal = 0, runs = 0;
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
     Dice dice(seed);
-    const int n = 9 + static_cast<int>(seed % 6);
-    const bool closed = seed % 2 == 0;
+    const int n = 9 + static_cast<int>(seed % 12);
+    const bool closed = dice.below(2) == 0;
     const TourProblem problem =
         seed % 3 == 0 ? asymmetric_problem(dice, n, closed) : points_problem(dice, n, closed);
     const Tour exact = solve_tour(problem);
@@ -100,15 +100,16 @@ TEST(Tour, SearchFindsWhatHeldAndKarpProve) {
   EXPECT_GE(optimal, runs - 3);
 }
 
-TEST(Tour, IsExactWithTwentyNodesWhenAsked) {
-  Dice dice(20);
-  const TourProblem problem = points_problem(dice, 20, true);
-  const Tour exact = solve_tour(problem, {.exact_nodes_max = 20});
-  const Tour found = solve_tour(problem);
-  expect_valid(problem, exact);
-  EXPECT_TRUE(exact.proven);
-  EXPECT_FALSE(found.proven);
-  EXPECT_NEAR(found.cost, exact.cost, 1e-9);
+TEST(Tour, IsExactUpToTwentyNodes) {
+  for (const bool closed : {true, false}) {
+    Dice dice(20);
+    const TourProblem problem = asymmetric_problem(dice, 20, closed);
+    const Tour exact = solve_tour(problem);
+    expect_valid(problem, exact);
+    EXPECT_TRUE(exact.proven);
+    EXPECT_LE(exact.cost, solve_tour(problem, {.exact_nodes_max = 19}).cost + 1e-9);
+    EXPECT_FALSE(solve_tour(points_problem(dice, 21, closed)).proven);
+  }
 }
 
 // What a person would do: always on to the nearest station.
@@ -272,10 +273,9 @@ TEST(Tour, IsWithinOnePercentOnEveryTsplibInstance) {
   ASSERT_GE(optima.size(), 17u);
   for (const auto& [name, optimum] : optima) {
     const TourProblem problem = support::tsp_problem(kTsplib / (name + ".tsp"));
-    const auto before = std::chrono::steady_clock::now();
+    const std::clock_t before = std::clock();
     const Tour tour = solve_tour(problem);
-    const double took_s =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - before).count();
+    const double took_s = static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC;
     expect_valid(problem, tour);
     EXPECT_GE(tour.cost, optimum) << name
                                   << ": shorter than the optimum, so the distances are wrong";
@@ -283,6 +283,9 @@ TEST(Tour, IsWithinOnePercentOnEveryTsplibInstance) {
     if (tour.order.size() <= 100) {
       EXPECT_EQ(tour.cost, optimum) << name;
     }
+#ifdef NDEBUG  // Sanitizers are slow.
+    EXPECT_LE(took_s, 1) << name;
+#endif
     std::printf("%-10s %7.0f  gap %.3f %%  %.2f s\n", name.c_str(), tour.cost,
                 100 * (tour.cost / optimum - 1), took_s);
   }
