@@ -23,7 +23,7 @@ constexpr std::string_view kBlanks = " \t\r\f\v";
 
 std::string_view trimmed(std::string_view text) {
   const auto first = text.find_first_not_of(kBlanks);
-  if (first == std::string_view::npos) return {};
+  if (first == std::string_view::npos) return text.substr(text.size());
   return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
 }
 
@@ -345,7 +345,10 @@ LoadedTsp parse_tsp(std::string_view text, const std::string& file) {
 
 LoadedTsp load_tsp(const std::filesystem::path& file) {
   const auto text = mission::read_file(file);
-  if (!text) return {{}, {{file.string(), 0, 0, text.error().text()}}};
+  if (!text)
+    return {{},
+            {{file.string(), 0, 0,
+              fmt::format("cannot be read: {}; check the path", text.error().code.message())}}};
   return parse_tsp(*text, file.string());
 }
 

@@ -90,7 +90,7 @@ void noding(benchmark::State& state) {
 BENCHMARK(noding)->Arg(kSmall)->Arg(kLarge)->Unit(benchmark::kMillisecond);
 
 // From node to node along the roads, the same pairs for both searches.
-void along_roads(benchmark::State& state, nav::Roadmap::Search search) {
+void search_roads(benchmark::State& state, nav::Roadmap::Search search) {
   const Site& s = site(static_cast<int>(state.range(0)));
   const nav::Roadmap roadmap = nav::Roadmap::build(s.area, kRadiusM);
   const int nodes = static_cast<int>(roadmap.graph().nodes_m.size());
@@ -112,16 +112,12 @@ void along_roads(benchmark::State& state, nav::Roadmap::Search search) {
   state.counters["length_m"] = length_m / static_cast<double>(pairs.size());
 }
 void along_roads(benchmark::State& state) {
-  along_roads(state, nav::Roadmap::Search::a_star);
+  search_roads(state, nav::Roadmap::Search::a_star);
 }
 void along_roads_by_dijkstra(benchmark::State& state) {
-  along_roads(state, nav::Roadmap::Search::dijkstra);
+  search_roads(state, nav::Roadmap::Search::dijkstra);
 }
-BENCHMARK(static_cast<void (*)(benchmark::State&)>(along_roads))
-    ->Name("along_roads")
-    ->Arg(kSmall)
-    ->Arg(kLarge)
-    ->Unit(benchmark::kMicrosecond);
+BENCHMARK(along_roads)->Arg(kSmall)->Arg(kLarge)->Unit(benchmark::kMicrosecond);
 BENCHMARK(along_roads_by_dijkstra)->Arg(kSmall)->Arg(kLarge)->Unit(benchmark::kMicrosecond);
 
 void route(benchmark::State& state) {
