@@ -32,7 +32,7 @@ class Horizon {
       hidden = nearness_[index(s)] > std::max(at_border, at_next) + line.margin;
       at_border = at_next;
     }
-    if (!hidden) add(line, sector_of(from + kKeyMargin) + 1, sector_of(to - kKeyMargin));
+    if (!hidden) add(edge, line, sector_of(from + kKeyMargin) + 1, sector_of(to - kKeyMargin));
     return hidden;
   }
 
@@ -63,7 +63,7 @@ class Horizon {
   static constexpr int kSectors = 1024;
   static constexpr double kPerKey = kSectors / 4;
   static constexpr double kKeyMargin = 1e-9;  // Of angle_key, in sectors.
-  static constexpr double kRounding = 1e-15;
+  static constexpr double kRounding = 2e-15;
 
   // Of length 1 in the norm; exact.
   struct Direction {
@@ -93,19 +93,48 @@ class Horizon {
     return {x, key < 2 ? 1 - std::abs(x) : std::abs(x) - 1};
   }
 
-  // In the sectors from first to before last, which the wall spans.
-  void add(const Line& line, int first, int last) {
-    if (first >= last) return;
+  // A wall that covers a sector from one of its borders to `end`.
+  struct Part {
+    double nearness = 0;  // At least; 0: there is none.
+    nav::PointMm end;
+  };
+
+  // The wall spans the sectors from first to before last, and parts of those beside them.
+  void add(const SightEdge& edge, const Line& line, int first, int last) {
+    if (first > last) return;
     double at_border = line.nearness(border(first));
+    add_part(upper_[index(first - 1)],
+             {std::min(at_border, nearness(edge.p)) - line.margin, edge.p}, first - 1);
     for (int s = first; s < last; ++s) {
       const double at_next = line.nearness(border(s + 1));
-      double& known = nearness_[index(s)];
-      known = std::max(known, std::min(at_border, at_next) - line.margin);
+      raise(s, std::min(at_border, at_next) - line.margin);
       at_border = at_next;
     }
+    add_part(lower_[index(last)], {std::min(at_border, nearness(edge.q)) - line.margin, edge.q},
+             last);
+  }
+
+  static double nearness(nav::PointMm p) {
+    return 1 / (std::abs(static_cast<double>(p.x)) + std::abs(static_cast<double>(p.y)));
+  }
+
+  void raise(int sector, double nearness) {
+    double& known = nearness_[index(sector)];
+    known = std::max(known, nearness);
+  }
+
+  // Two parts that meet, as walls do in a corner, hide as one wall does.
+  void add_part(Part& known, const Part& part, int sector) {
+    if (part.nearness <= known.nearness) return;
+    known = part;
+    const Part &lower = lower_[index(sector)], &upper = upper_[index(sector)];
+    if (lower.nearness > 0 && upper.nearness > 0 && nav::cross(upper.end, lower.end) >= 0)
+      raise(sector, std::min(lower.nearness, upper.nearness));
   }
 
   std::array<double, kSectors> nearness_{};  // Of what hides all behind it in a sector; 0: nothing.
+  std::array<Part, kSectors> lower_{};       // From the sector's first border on.
+  std::array<Part, kSectors> upper_{};       // Up to its last border.
 };
 
 }  // namespace planning

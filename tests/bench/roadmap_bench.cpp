@@ -12,7 +12,7 @@
 namespace {
 
 constexpr double kRadiusM = 0.5;
-constexpr int kSmall = 150, kLarge = 1700;  // Obstacles; 100 come to about 600 edges.
+constexpr int kSmall = 150, kLarge = 1400;  // Obstacles; 100 come to about 720 edges.
 
 struct Site {
   double side_m;
