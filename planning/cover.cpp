@@ -4,7 +4,9 @@
 #include <cmath>
 
 #include "nav/words.hpp"
+#include "planning/cover_bound.hpp"
 #include "planning/greedy.hpp"
+#include "planning/refine.hpp"
 #include "planning/spans.hpp"
 #include "planning/voxel_parallel.hpp"
 
@@ -22,6 +24,7 @@ std::vector<std::vector<Span>> views_of(const std::vector<Candidate>& candidates
                for (std::size_t i = begin; i < end; ++i)
                  views[i] = spans_of(visibility.from(candidates[i]));
              });
+  join_ends(views, visibility.walls().size());
   return views;
 }
 
@@ -147,6 +150,30 @@ Station station(const Candidate& at, const std::vector<Span>& view, const Pick& 
           .overlaps_m = nm_to_m(pick.overlaps_nm)};
 }
 
+std::string bound_in_words(std::size_t stations, int at_least) {
+  if (stations == 0) return "";
+  const std::string text =
+      nav::counted(static_cast<int>(stations), "station", "stations") + "; provably ";
+  return text + (static_cast<int>(stations) <= at_least
+                     ? "no fewer will do."
+                     : "at least " + std::to_string(at_least) + ".");
+}
+
+// The cover that the method asks for, and what the plan says of it beside.
+GreedyCover chosen_cover(const std::vector<std::vector<Span>>& views, std::size_t walls,
+                         const CoverRules& rules, CoverMethod method, std::uint64_t seed,
+                         CoverPlan& plan) {
+  GreedyCover cover = greedy_cover(views, walls, rules);
+  plan.stations_greedy = static_cast<int>(cover.picks.size());
+  SetCover atoms = wall_atoms(views, walls);
+  atoms.goal = std::min(rules.goal_nm, covered_nm(cover));
+  plan.stations_at_least = stations_at_least(atoms, plan.stations_greedy);
+  if (method == CoverMethod::refined)
+    cover = refined_cover(views, walls, atoms, rules, cover, plan.stations_at_least, seed);
+  plan.bound = bound_in_words(cover.picks.size(), plan.stations_at_least);
+  return cover;
+}
+
 // Rounded up, so that reaching it is reaching the share.
 std::int64_t share_of(double share, std::int64_t whole_nm) {
   return static_cast<std::int64_t>(std::ceil(share * static_cast<double>(whole_nm)));
@@ -168,14 +195,17 @@ CoverPlan plan_cover(const nav::FreeArea& area, const std::vector<Wall>& walls,
   const CoverRules rules{.goal_nm = share_of(config.coverage_goal, coverable.total_nm()),
                          .gain_min_nm = share_of(config.gain_min, targets.total_nm()),
                          .overlap_min = config.overlap_min};
-  const GreedyCover cover = greedy_cover(views, walls.size(), rules);
+  const GreedyCover cover = chosen_cover(views, walls.size(), rules, config.method, seed, plan);
 
   SpanSet covered(walls.size());
+  std::vector<std::vector<Span>> chosen_views;
   for (const Pick& pick : cover.picks) {
     const auto i = static_cast<std::size_t>(pick.candidate);
     plan.stations.push_back(station(plan.candidates[i], views[i], pick));
+    chosen_views.push_back(views[i]);
     covered.add(views[i]);
   }
+  plan.overlap = overlap_graph(chosen_views, config.overlap_min);
   plan.target_m = nm_to_m(targets.total_nm());
   plan.coverable_m = nm_to_m(coverable.total_nm());
   plan.covered_m = nm_to_m(covered.total_nm());

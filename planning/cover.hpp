@@ -8,6 +8,7 @@
 #include "nav/free_space.hpp"
 #include "nav/geometry.hpp"
 #include "nav/site_map.hpp"
+#include "planning/overlap_graph.hpp"
 #include "planning/visibility.hpp"
 
 namespace planning {
@@ -28,8 +29,8 @@ struct Station {
   Candidate at;
   std::vector<WallPiece> sees;  // Target pieces only; in order of wall and place.
   double sees_m{};
-  double adds_m{};      // New when it was chosen.
-  double overlaps_m{};  // Already seen when it was chosen.
+  double adds_m{};      // Not seen by the stations before it.
+  double overlaps_m{};  // Seen by those already.
 };
 
 struct UncoveredPiece {
@@ -41,7 +42,11 @@ struct UncoveredPiece {
   Excluded reason{};
 };
 
+// greedy: Algorithm 1 of the paper. refined: then a swap search for fewer stations (refine.hpp).
+enum class CoverMethod { greedy, refined };
+
 struct CoverConfig {
+  CoverMethod method = CoverMethod::refined;
   int candidates = 1000;
   double coverage_goal = 0.98;  // Share of the coverable target length.
   double gain_min = 0.02;       // Stop when the next view adds less than this share of the target.
@@ -50,12 +55,18 @@ struct CoverConfig {
 
 struct CoverPlan {
   std::vector<Candidate> candidates;
-  std::vector<Station> stations;          // In the order chosen.
+  // In an order in which each overlaps those before it as the rules ask; greedy: as chosen.
+  std::vector<Station> stations;
   std::vector<UncoveredPiece> uncovered;  // In order of wall and place; 1 mm or longer.
   double target_m{};                      // All target wall of this area.
   double coverable_m{};                   // What the candidates together can see.
   double covered_m{};
-  std::string end;  // Why it stopped, in a sentence.
+  std::string end;          // Why it stopped, in a sentence.
+  int stations_greedy{};    // How many the paper's greedy cover takes.
+  int stations_at_least{};  // Proven: no fewer of these candidates cover the goal, or as much as
+                            // the greedy cover where that falls short of it (cover_bound.hpp).
+  std::string bound;        // "30 stations; provably at least 26."
+  OverlapGraph overlap;     // Of the stations.
 };
 
 // `count` random viewpoints, uniform in the area's standable part, on the grid; with random
@@ -68,8 +79,9 @@ std::vector<Candidate> draw_candidates(const nav::FreeArea& area, int count, dou
 // always the one that adds the most (ties: the lowest index), among those of whose view a share of
 // overlap_min is covered already (the first station excepted). Stops at the coverage goal, when the
 // next view adds less than gain_min, when only candidates without enough overlap would add
-// anything, or when all that can be covered is. Independent of `threads`. Lengths are sums of whole
-// nanometres, so that they do not depend on the order of summation.
+// anything, or when all that can be covered is. Refined by default: see CoverMethod. Independent of
+// `threads`. Lengths are sums of whole nanometres, so that they do not depend on the order of
+// summation; view ends that differ by rounding only are one place (join_ends).
 CoverPlan plan_cover(const nav::FreeArea& area, const std::vector<Wall>& walls,
                      const SensorLimits& limits, const CoverConfig& config, std::uint64_t seed,
                      int threads);

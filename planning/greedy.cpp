@@ -26,17 +26,23 @@ class Greedy {
     }
   }
 
-  GreedyCover run() {
+  GreedyCover run(const std::vector<int>& first) {
+    for (const int candidate : first) pick(candidate, adds_nm(candidate));
     while (true) {
       if (round() > 0 && covered_.total_nm() >= rules_.goal_nm) return ended(CoverEnd::goal);
       const int best = next();
       if (best < 0) return ended(why_nothing_is_left());
-      pick(best);
+      pick(best, cover_.next_gain_nm);
     }
   }
 
  private:
   std::size_t round() const { return cover_.picks.size(); }
+
+  std::int64_t adds_nm(int candidate) const {
+    const auto i = static_cast<std::size_t>(candidate);
+    return sees_nm_[i] - covered_.overlap_nm(views_[i]);
+  }
 
   bool may_be_picked(int candidate, std::int64_t adds_nm) const {
     const std::int64_t sees_nm = sees_nm_[static_cast<std::size_t>(candidate)];
@@ -51,9 +57,8 @@ class Greedy {
     while (best < 0 && !bounds_.empty() && bounds_.top().adds_nm > 0) {
       Bound top = bounds_.top();
       bounds_.pop();
-      const auto& view = views_[static_cast<std::size_t>(top.candidate)];
       if (top.round != static_cast<int>(round())) {
-        top.adds_nm = sees_nm_[static_cast<std::size_t>(top.candidate)] - covered_.overlap_nm(view);
+        top.adds_nm = adds_nm(top.candidate);
         top.round = static_cast<int>(round());
         bounds_.push(top);
         continue;
@@ -70,11 +75,10 @@ class Greedy {
     return cover_.next_gain_nm >= rules_.gain_min_nm ? best : -1;
   }
 
-  void pick(int best) {
-    const auto& view = views_[static_cast<std::size_t>(best)];
-    const std::int64_t sees_nm = sees_nm_[static_cast<std::size_t>(best)];
-    cover_.picks.push_back({best, cover_.next_gain_nm, sees_nm - cover_.next_gain_nm});
-    covered_.add(view);
+  void pick(int candidate, std::int64_t adds_nm) {
+    const auto i = static_cast<std::size_t>(candidate);
+    cover_.picks.push_back({candidate, adds_nm, sees_nm_[i] - adds_nm});
+    covered_.add(views_[i]);
   }
 
   CoverEnd why_nothing_is_left() const {
@@ -99,8 +103,8 @@ class Greedy {
 }  // namespace
 
 GreedyCover greedy_cover(const std::vector<std::vector<Span>>& views, std::size_t walls,
-                         const CoverRules& rules) {
-  return Greedy(views, walls, rules).run();
+                         const CoverRules& rules, const std::vector<int>& first) {
+  return Greedy(views, walls, rules).run(first);
 }
 
 }  // namespace planning

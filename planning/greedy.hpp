@@ -33,6 +33,13 @@ struct GreedyCover {
   std::int64_t next_gain_refused_nm{};  // The best among those without enough overlap.
 };
 
+// All picks together.
+inline std::int64_t covered_nm(const GreedyCover& cover) {
+  std::int64_t sum = 0;
+  for (const Pick& pick : cover.picks) sum += pick.adds_nm;
+  return sum;
+}
+
 // Whether so much of what a candidate sees is covered already that its scan can be registered.
 inline bool overlaps_enough(std::int64_t sees_nm, std::int64_t overlaps_nm, double overlap_min) {
   return static_cast<double>(overlaps_nm) >= overlap_min * static_cast<double>(sees_nm);
@@ -40,8 +47,9 @@ inline bool overlaps_enough(std::int64_t sees_nm, std::int64_t overlaps_nm, doub
 
 // views[i]: what candidate i sees, disjoint. Picks the candidate that adds the most, ties to the
 // lowest index, until the rules end it. What a candidate adds never grows, so old values are upper
-// bounds and most need no update: the picks are those of asking all of them every time.
+// bounds and most need no update: the picks are those of asking all of them every time. `first` are
+// picked before all others, in this order and whatever the rules say.
 GreedyCover greedy_cover(const std::vector<std::vector<Span>>& views, std::size_t walls,
-                         const CoverRules& rules);
+                         const CoverRules& rules, const std::vector<int>& first = {});
 
 }  // namespace planning

@@ -10,6 +10,19 @@ auto first_reaching(Spans& spans, std::int64_t place_nm) {
                               [=](const Span& s) { return s.to_nm < place_nm; });
 }
 
+// Of places at most kGapNm apart in a row, the first.
+void keep_first_of_chains(std::vector<std::int64_t>& places_nm) {
+  std::ranges::sort(places_nm);
+  std::vector<std::int64_t> kept;
+  for (std::size_t i = 0; i < places_nm.size(); ++i)
+    if (i == 0 || places_nm[i] - places_nm[i - 1] > kGapNm) kept.push_back(places_nm[i]);
+  places_nm = std::move(kept);
+}
+
+std::int64_t last_up_to(const std::vector<std::int64_t>& places_nm, std::int64_t place_nm) {
+  return *std::prev(std::ranges::upper_bound(places_nm, place_nm));
+}
+
 }  // namespace
 
 std::vector<Span> spans_of(const std::vector<WallPiece>& pieces) {
@@ -29,6 +42,30 @@ std::int64_t length_nm(const std::vector<Span>& spans) {
   std::int64_t sum = 0;
   for (const Span& s : spans) sum += s.length_nm();
   return sum;
+}
+
+void join_ends(std::vector<std::vector<Span>>& views, std::size_t walls) {
+  std::vector<std::vector<std::int64_t>> places(walls);
+  for (const auto& view : views)
+    for (const Span& s : view)
+      for (const std::int64_t end_nm : {s.from_nm, s.to_nm})
+        places[static_cast<std::size_t>(s.wall)].push_back(end_nm);
+  for (auto& on_wall : places) keep_first_of_chains(on_wall);
+  for (auto& view : views) {
+    std::vector<Span> joined;
+    for (const Span& s : view) {
+      const auto& on_wall = places[static_cast<std::size_t>(s.wall)];
+      const Span span{s.wall, last_up_to(on_wall, s.from_nm), last_up_to(on_wall, s.to_nm)};
+      if (span.length_nm() == 0) continue;
+      if (!joined.empty() && joined.back().wall == span.wall &&
+          joined.back().to_nm == span.from_nm) {
+        joined.back().to_nm = span.to_nm;
+      } else {
+        joined.push_back(span);
+      }
+    }
+    view = std::move(joined);
+  }
 }
 
 void SpanSet::add(const Span& span) {

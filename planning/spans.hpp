@@ -32,6 +32,12 @@ std::vector<Span> spans_of(const std::vector<WallPiece>& pieces);
 std::vector<WallPiece> pieces_of(const std::vector<Span>& spans);
 std::int64_t length_nm(const std::vector<Span>& spans);
 
+// Ends of views on the same wall that differ by rounding only (chains of ends at most kGapNm apart)
+// become one place, the least of them; spans of a view that then touch become one. Afterwards sets
+// of these views close no gaps, so that lengths of unions add up piece by piece. Each view is in
+// order of wall and place.
+void join_ends(std::vector<std::vector<Span>>& views, std::size_t walls);
+
 // Disjoint spans on each of a number of walls.
 class SpanSet {
  public:

@@ -1,0 +1,169 @@
+#include "planning/refine.hpp"
+
+#include <algorithm>
+#include <map>
+#include <tuple>
+
+#include "planning/overlap_graph.hpp"
+#include "planning/set_cover_search.hpp"
+#include "planning/station_order.hpp"
+
+namespace planning {
+namespace {
+
+// How well the scans of some stations hold together, and how much they cover; less is better.
+struct Quality {
+  int parts{};
+  int bridges{};
+  std::int64_t uncovered_nm{};
+
+  auto operator<=>(const Quality&) const = default;
+};
+
+// Links between candidates, worked out when first asked for.
+class Links {
+ public:
+  Links(const std::vector<std::vector<Span>>& views, double overlap_min)
+      : views_(views), overlap_min_(overlap_min) {}
+
+  GraphParts parts(const std::vector<int>& stations) {
+    std::vector<std::pair<int, int>> edges;
+    for (std::size_t a = 0; a < stations.size(); ++a)
+      for (std::size_t b = 0; b < a; ++b)
+        if (is_linked(stations[a], stations[b])) edges.emplace_back(b, a);
+    return parts_of(static_cast<int>(stations.size()), edges);
+  }
+
+ private:
+  bool is_linked(int a, int b) {
+    const auto [known, is_new] = known_.try_emplace(std::minmax(a, b));
+    if (is_new) {
+      const auto& view_a = views_[static_cast<std::size_t>(a)];
+      const auto& view_b = views_[static_cast<std::size_t>(b)];
+      known->second =
+          linked(length_nm(view_a), length_nm(view_b), shared_nm(view_a, view_b), overlap_min_);
+    }
+    return known->second;
+  }
+
+  const std::vector<std::vector<Span>>& views_;
+  double overlap_min_;
+  std::map<std::pair<int, int>, bool> known_;
+};
+
+class Refinement {
+ public:
+  Refinement(const std::vector<std::vector<Span>>& views, const SetCover& atoms,
+             const CoverRules& rules, const GreedyCover& greedy, const RefineEffort& effort,
+             std::uint64_t seed)
+      : atoms_(atoms),
+        rules_(rules),
+        effort_(effort),
+        seed_(seed),
+        candidates_(undominated(atoms)),
+        links_(views, rules.overlap_min) {
+    for (const Pick& pick : greedy.picks) best_.push_back(pick.candidate);
+    greedy_size_ = best_.size();
+    greedy_nm_ = covered(atoms_, best_);
+    atoms_.goal = std::min(rules.goal_nm, greedy_nm_);
+  }
+
+  std::vector<int> run(int at_least) {
+    fewer(static_cast<std::size_t>(std::max(1, at_least)));
+    if (best_.size() == greedy_size_) atoms_.goal = greedy_nm_;
+    hold_together();
+    add_for_links();
+    return best_;
+  }
+
+ private:
+  // Takes out station after station and swaps others until the goal is reached again.
+  void fewer(std::size_t at_least) {
+    if (best_.size() <= at_least) return;
+    SwapSearch search(atoms_, candidates_, best_, seed_);
+    search.drop();
+    for (int swaps = 0; swaps < effort_.swaps; ++swaps) {
+      if (search.reaches_goal()) {
+        if (auto order = station_order(atoms_, search.chosen(), rules_)) {
+          best_ = *std::move(order);
+          if (best_.size() <= at_least) return;
+          search.drop();
+          swaps = 0;
+          continue;
+        }
+      }
+      if (!search.swap()) return;
+    }
+  }
+
+  Quality quality(const std::vector<int>& stations, std::int64_t covered_nm) {
+    const GraphParts parts = links_.parts(stations);
+    return {parts.parts, static_cast<int>(parts.bridges.size()), -covered_nm};
+  }
+
+  // Swaps on among covers of the same size, and keeps the best.
+  void hold_together() {
+    if (best_.size() < 2) return;
+    SwapSearch search(atoms_, candidates_, best_, seed_ + 1);
+    Quality best = quality(best_, search.covered());
+    for (int swaps = 0; swaps < effort_.swaps_links && search.swap(); ++swaps) {
+      if (!search.reaches_goal()) continue;
+      const Quality now = quality(search.chosen(), search.covered());
+      if (now >= best) continue;
+      if (auto order = station_order(atoms_, search.chosen(), rules_)) {
+        best_ = *std::move(order);
+        best = now;
+      }
+    }
+  }
+
+  void add_for_links() {
+    while (best_.size() < greedy_size_ && add_one_for_links()) {
+    }
+  }
+
+  // Adds the station that leaves the fewest parts and bridges, if fewer than now.
+  bool add_one_for_links() {
+    std::vector<std::pair<Quality, int>> helpful;
+    const Quality now = quality(best_, 0);
+    for (const int candidate : candidates_) {
+      if (std::ranges::find(best_, candidate) != best_.end()) continue;
+      std::vector<int> more = best_;
+      more.push_back(candidate);
+      if (const Quality then = quality(more, 0); then < now) helpful.emplace_back(then, candidate);
+    }
+    std::ranges::sort(helpful);
+    for (const auto& [then, candidate] : helpful) {
+      std::vector<int> more = best_;
+      more.push_back(candidate);
+      if (auto order = station_order(atoms_, more, rules_)) {
+        best_ = *std::move(order);
+        return true;
+      }
+    }
+    return false;
+  }
+
+  SetCover atoms_;
+  CoverRules rules_;
+  RefineEffort effort_;
+  std::uint64_t seed_;
+  std::vector<int> candidates_;
+  Links links_;
+  std::vector<int> best_;  // In an order that obeys the rules.
+  std::size_t greedy_size_{};
+  std::int64_t greedy_nm_{};
+};
+
+}  // namespace
+
+GreedyCover refined_cover(const std::vector<std::vector<Span>>& views, std::size_t walls,
+                          const SetCover& atoms, const CoverRules& rules, const GreedyCover& greedy,
+                          int at_least, std::uint64_t seed, const RefineEffort& effort) {
+  if (greedy.picks.empty()) return greedy;
+  const auto stations = Refinement(views, atoms, rules, greedy, effort, seed).run(at_least);
+  GreedyCover refined = greedy_cover(views, walls, rules, stations);
+  return refined.picks.size() <= greedy.picks.size() ? refined : greedy;
+}
+
+}  // namespace planning

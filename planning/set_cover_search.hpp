@@ -1,0 +1,69 @@
+// Swap search for set covers of a given size: exchanges one set at a time, by exact gains.
+#pragma once
+
+#include <cstdint>
+#include <random>
+#include <vector>
+
+#include "planning/set_cover.hpp"
+
+namespace planning {
+
+// Holds some chosen sets and, kept up to date, what every exchange of one of them would change:
+// what a set would add (atoms that none holds), and what it would save of the atoms that one
+// chosen set alone holds (as in the swap search of Resende and Werneck for p-median). Each swap is
+// the best one that is not tabu, also when it makes things worse. Where the goal leaves out nothing
+// of an atom's weight, the atom must be covered: the longer it is not, the more it counts.
+//
+// Same problem, same start, same seed: the same swaps. Memory: chosen * sets and the incidences.
+class SwapSearch {
+ public:
+  // Of all sets only `candidates` are swapped in. `problem` must outlive the search.
+  SwapSearch(const SetCover& problem, const std::vector<int>& candidates,
+             const std::vector<int>& chosen, std::uint64_t seed);
+
+  const std::vector<int>& chosen() const { return chosen_; }  // In no order.
+  std::int64_t covered() const { return covered_; }
+  bool reaches_goal() const { return covered_ >= problem_.goal; }
+
+  // Takes out the set whose loss is least. At least one must be chosen.
+  void drop();
+  // Makes the best swap that is not tabu. False if there is none.
+  bool swap();
+
+ private:
+  struct Move {
+    std::size_t slot{};
+    int set = -1;
+    std::int64_t delta{};
+  };
+
+  void put(std::size_t slot, int set);
+  void take(std::size_t slot);
+  void shift(std::vector<std::int64_t>& of_sets, int atom, std::int64_t by);
+  Move best_move() const;
+  void press();  // Makes what must be covered and is not count more.
+  std::int64_t loss(std::size_t slot) const {
+    return saves_[slot][static_cast<std::size_t>(chosen_[slot])];
+  }
+
+  const SetCover& problem_;
+  std::vector<int> candidates_;
+  std::vector<std::vector<int>> held_by_;  // Candidates and chosen sets only.
+  std::vector<int> required_;
+  std::vector<int> chosen_;          // By slot; -1 while a slot is empty.
+  std::vector<char> is_chosen_;      // By set.
+  std::vector<std::int64_t> price_;  // By atom: its weight, or more.
+  std::vector<int> times_;           // By atom: how many chosen sets hold it,
+  std::vector<std::size_t> slots_;   // and their slots, each exclusive-ored with the others.
+  std::vector<std::int64_t> adds_;   // By set: the price of what none holds.
+  // By slot and set: the price of the set's atoms that this slot's set alone holds.
+  std::vector<std::vector<std::int64_t>> saves_;
+  std::int64_t covered_ = 0;
+  std::int64_t now_ = 0;                    // Swaps made.
+  std::vector<std::int64_t> in_again_at_;   // By set: when it may come back.
+  std::vector<std::int64_t> out_again_at_;  // By slot: when its set may leave.
+  std::mt19937_64 random_;
+};
+
+}  // namespace planning
