@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <boost/container_hash/hash.hpp>
 #include <numeric>
-#include <utility>
 #include <unordered_map>
+#include <utility>
 
 namespace planning {
 namespace {
@@ -111,6 +111,23 @@ std::vector<std::vector<int>> holders(const SetCover& problem) {
   return held_by;
 }
 
+std::vector<std::vector<Run>> runs(const SetCover& problem) {
+  std::vector<std::vector<Run>> all;
+  for (const auto& set : problem.sets) {
+    auto& of_set = all.emplace_back();
+    for (const int atom : set) {
+      const auto a = static_cast<std::size_t>(atom);
+      if (of_set.empty() || of_set.back().to != a) of_set.push_back({a, a});
+      ++of_set.back().to;
+    }
+  }
+  return all;
+}
+
+std::int64_t total(const SetCover& problem) {
+  return std::accumulate(problem.weight.begin(), problem.weight.end(), std::int64_t{0});
+}
+
 std::int64_t weight_of(const SetCover& problem, const std::vector<int>& atoms) {
   std::int64_t sum = 0;
   for (const int atom : atoms) sum += problem.weight[static_cast<std::size_t>(atom)];
@@ -143,8 +160,7 @@ std::vector<int> undominated(const SetCover& problem) {
 
 SetCover without_implied_atoms(const SetCover& problem) {
   const auto held_by = holders(problem);
-  const std::int64_t left_out =
-      std::accumulate(problem.weight.begin(), problem.weight.end(), std::int64_t{0}) - problem.goal;
+  const std::int64_t left_out = total(problem) - problem.goal;
   std::vector<char> required(problem.atoms());
   for (std::size_t a = 0; a < problem.atoms(); ++a)
     required[a] = problem.weight[a] > left_out && !held_by[a].empty();

@@ -27,6 +27,17 @@ SetCover wall_atoms(const std::vector<std::vector<Span>>& views, std::size_t wal
 // The sets that hold each atom, ascending.
 std::vector<std::vector<int>> holders(const SetCover& problem);
 
+// Atoms from, ..., to - 1.
+struct Run {
+  std::size_t from{}, to{};
+};
+// The atoms of each set as runs: few where atoms are pieces of walls, one after the other. With
+// sums over the first atoms, 0, 1, 2, ... of them, a set's sum costs its runs rather than its
+// atoms.
+std::vector<std::vector<Run>> runs(const SetCover& problem);
+
+// What all atoms weigh.
+std::int64_t total(const SetCover& problem);
 std::int64_t weight_of(const SetCover& problem, const std::vector<int>& atoms);
 // What the atoms of these sets weigh together.
 std::int64_t covered(const SetCover& problem, const std::vector<int>& chosen);

@@ -1,15 +1,10 @@
 #include "planning/set_cover_search.hpp"
 
 #include <algorithm>
-#include <numeric>
 #include <utility>
 
 namespace planning {
 namespace {
-
-std::int64_t total(const std::vector<std::int64_t>& weights) {
-  return std::accumulate(weights.begin(), weights.end(), std::int64_t{0});
-}
 
 // How long a set stays out, and a slot keeps its set. Varies, so that the search does not circle.
 constexpr std::uint64_t kOutMin = 4, kOutSpread = 6, kKeepMin = 1, kKeepSpread = 3;
@@ -18,52 +13,47 @@ std::size_t index(int i) {
   return static_cast<std::size_t>(i);
 }
 
+std::vector<int> united(std::vector<int> a, const std::vector<int>& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  std::ranges::sort(a);
+  a.erase(std::unique(a.begin(), a.end()), a.end());
+  return a;
+}
+
 }  // namespace
 
 SwapSearch::SwapSearch(const SetCover& problem, const std::vector<int>& candidates,
                        const std::vector<int>& chosen, std::uint64_t seed)
     : problem_(problem),
-      candidates_(candidates),
-      held_by_(problem.atoms()),
+      candidates_(united(candidates, chosen)),
+      runs_(runs(problem)),
+      chosen_(chosen.size(), -1),
       is_chosen_(problem.sets.size()),
       price_(problem.weight),
       times_(problem.atoms()),
       slots_(problem.atoms()),
       adds_(problem.sets.size()),
+      saves_(chosen.size(), std::vector<std::int64_t>(problem.sets.size())),
+      is_stale_(chosen.size(), true),
+      sum_to_(problem.atoms() + 1),
       in_again_at_(problem.sets.size()),
+      out_again_at_(chosen.size()),
       random_(seed) {
-  candidates_.insert(candidates_.end(), chosen.begin(), chosen.end());
-  std::ranges::sort(candidates_);
-  candidates_.erase(std::unique(candidates_.begin(), candidates_.end()), candidates_.end());
-  for (const int i : candidates_) {
-    for (const int atom : problem_.sets[index(i)]) held_by_[index(atom)].push_back(i);
-    adds_[index(i)] = weight_of(problem_, problem_.sets[index(i)]);
-  }
-  const std::int64_t left_out = total(problem_.weight) - problem_.goal;
+  const std::int64_t left_out = total(problem) - problem.goal;
   for (std::size_t a = 0; a < problem_.atoms(); ++a)
     if (problem_.weight[a] > left_out) required_.push_back(static_cast<int>(a));
-  chosen_.assign(chosen.size(), -1);
-  saves_.assign(chosen.size(), std::vector<std::int64_t>(problem.sets.size()));
-  out_again_at_.assign(chosen.size(), 0);
   for (std::size_t slot = 0; slot < chosen.size(); ++slot) put(slot, chosen[slot]);
-}
-
-void SwapSearch::shift(std::vector<std::int64_t>& of_sets, int atom, std::int64_t by) {
-  for (const int i : held_by_[index(atom)]) of_sets[index(i)] += by;
+  refresh();
 }
 
 void SwapSearch::put(std::size_t slot, int set) {
   chosen_[slot] = set;
   is_chosen_[index(set)] = true;
+  is_stale_[slot] = true;
   for (const int atom : problem_.sets[index(set)]) {
     const std::size_t a = index(atom);
-    if (times_[a] == 0) {
-      covered_ += problem_.weight[a];
-      shift(adds_, atom, -price_[a]);
-      shift(saves_[slot], atom, price_[a]);
-    } else if (times_[a] == 1) {
-      shift(saves_[slots_[a]], atom, -price_[a]);
-    }
+    if (times_[a] == 0) covered_ += problem_.weight[a];
+    if (times_[a] == 1) is_stale_[slots_[a]] = true;
     ++times_[a];
     slots_[a] ^= slot;
   }
@@ -72,18 +62,37 @@ void SwapSearch::put(std::size_t slot, int set) {
 void SwapSearch::take(std::size_t slot) {
   const int set = std::exchange(chosen_[slot], -1);
   is_chosen_[index(set)] = false;
+  is_stale_[slot] = true;
   for (const int atom : problem_.sets[index(set)]) {
     const std::size_t a = index(atom);
     --times_[a];
     slots_[a] ^= slot;
-    if (times_[a] == 0) {
-      covered_ -= problem_.weight[a];
-      shift(adds_, atom, price_[a]);
-      shift(saves_[slot], atom, -price_[a]);
-    } else if (times_[a] == 1) {
-      shift(saves_[slots_[a]], atom, price_[a]);
-    }
+    if (times_[a] == 0) covered_ -= problem_.weight[a];
+    if (times_[a] == 1) is_stale_[slots_[a]] = true;
   }
+}
+
+// of_sets: the prices of each candidate's atoms that count.
+template <class Counts>
+void SwapSearch::sum_up(std::vector<std::int64_t>& of_sets, const Counts& counts) {
+  for (std::size_t a = 0; a < price_.size(); ++a)
+    sum_to_[a + 1] = sum_to_[a] + (counts(a) ? price_[a] : 0);
+  for (const int i : candidates_) {
+    std::int64_t sum = 0;
+    for (const Run& run : runs_[index(i)]) sum += sum_to_[run.to] - sum_to_[run.from];
+    of_sets[index(i)] = sum;
+  }
+}
+
+void SwapSearch::refresh() {
+  sum_up(adds_, [&](std::size_t a) { return times_[a] == 0; });
+  for (std::size_t slot = 0; slot < chosen_.size(); ++slot)
+    if (std::exchange(is_stale_[slot], false))
+      sum_up(saves_[slot], [&](std::size_t a) { return times_[a] == 1 && slots_[a] == slot; });
+}
+
+std::int64_t SwapSearch::loss(std::size_t slot) const {
+  return saves_[slot][index(chosen_[slot])];
 }
 
 void SwapSearch::drop() {
@@ -92,9 +101,8 @@ void SwapSearch::drop() {
     if (loss(slot) < loss(least)) least = slot;
   in_again_at_[index(chosen_[least])] = now_ + 1;
   take(least);
-  // The last slot moves into the gap.
   const std::size_t last = chosen_.size() - 1;
-  if (least != last) {
+  if (least != last) {  // The last slot moves into the gap.
     const int moved = chosen_[last];
     take(last);
     put(least, moved);
@@ -102,7 +110,9 @@ void SwapSearch::drop() {
   }
   chosen_.pop_back();
   saves_.pop_back();
+  is_stale_.pop_back();
   out_again_at_.pop_back();
+  refresh();
 }
 
 SwapSearch::Move SwapSearch::best_move() const {
@@ -131,16 +141,13 @@ bool SwapSearch::swap() {
   take(move.slot);
   put(move.slot, move.set);
   press();
+  refresh();
   return true;
 }
 
 void SwapSearch::press() {
-  for (const int atom : required_) {
-    if (times_[index(atom)] > 0) continue;
-    const std::int64_t more = problem_.weight[index(atom)];
-    price_[index(atom)] += more;
-    shift(adds_, atom, more);
-  }
+  for (const int atom : required_)
+    if (times_[index(atom)] == 0) price_[index(atom)] += problem_.weight[index(atom)];
 }
 
 }  // namespace planning

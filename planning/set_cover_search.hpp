@@ -12,13 +12,14 @@ namespace planning {
 // Holds some chosen sets and, kept up to date, what every exchange of one of them would change:
 // what a set would add (atoms that none holds), and what it would save of the atoms that one
 // chosen set alone holds (as in the swap search of Resende and Werneck for p-median). Each swap is
-// the best one that is not tabu, also when it makes things worse. Where the goal leaves out nothing
-// of an atom's weight, the atom must be covered: the longer it is not, the more it counts.
+// the best one that is not tabu, also when it makes things worse. Where the goal leaves out less
+// than an atom's weight, the atom must be covered: the longer it is not, the more it counts.
 //
-// Same problem, same start, same seed: the same swaps. Memory: chosen * sets and the incidences.
+// Same problem, same start, same seed: the same swaps. Memory: chosen * sets and the atoms.
 class SwapSearch {
  public:
-  // Of all sets only `candidates` are swapped in. `problem` must outlive the search.
+  // Of all sets only `candidates` (and those chosen first) are swapped in. `problem` must outlive
+  // the search.
   SwapSearch(const SetCover& problem, const std::vector<int>& candidates,
              const std::vector<int>& chosen, std::uint64_t seed);
 
@@ -40,25 +41,27 @@ class SwapSearch {
 
   void put(std::size_t slot, int set);
   void take(std::size_t slot);
-  void shift(std::vector<std::int64_t>& of_sets, int atom, std::int64_t by);
+  void press();    // Makes what must be covered and is not count more.
+  void refresh();  // adds_ and those of saves_ that changed.
+  template <class Counts>
+  void sum_up(std::vector<std::int64_t>& of_sets, const Counts& counts);
   Move best_move() const;
-  void press();  // Makes what must be covered and is not count more.
-  std::int64_t loss(std::size_t slot) const {
-    return saves_[slot][static_cast<std::size_t>(chosen_[slot])];
-  }
+  std::int64_t loss(std::size_t slot) const;
 
   const SetCover& problem_;
-  std::vector<int> candidates_;
-  std::vector<std::vector<int>> held_by_;  // Candidates and chosen sets only.
-  std::vector<int> required_;
-  std::vector<int> chosen_;          // By slot; -1 while a slot is empty.
-  std::vector<char> is_chosen_;      // By set.
-  std::vector<std::int64_t> price_;  // By atom: its weight, or more.
-  std::vector<int> times_;           // By atom: how many chosen sets hold it,
-  std::vector<std::size_t> slots_;   // and their slots, each exclusive-ored with the others.
-  std::vector<std::int64_t> adds_;   // By set: the price of what none holds.
+  std::vector<int> candidates_;         // Ascending.
+  std::vector<std::vector<Run>> runs_;  // By set.
+  std::vector<int> required_;           // Atoms that must be covered.
+  std::vector<int> chosen_;             // By slot; -1 while a slot is empty.
+  std::vector<char> is_chosen_;         // By set.
+  std::vector<std::int64_t> price_;     // By atom: its weight, or more.
+  std::vector<int> times_;              // By atom: how many chosen sets hold it,
+  std::vector<std::size_t> slots_;      // and their slots, each exclusive-ored with the others.
+  std::vector<std::int64_t> adds_;      // By set: the price of what none holds.
   // By slot and set: the price of the set's atoms that this slot's set alone holds.
   std::vector<std::vector<std::int64_t>> saves_;
+  std::vector<char> is_stale_;        // By slot: saves_ is to be worked out again.
+  std::vector<std::int64_t> sum_to_;  // Of prices, over the first atoms; for one use each.
   std::int64_t covered_ = 0;
   std::int64_t now_ = 0;                    // Swaps made.
   std::vector<std::int64_t> in_again_at_;   // By set: when it may come back.
