@@ -55,6 +55,7 @@ struct RobotConfig {
 
 // [phase1]
 struct Phase1Config {
+  std::string cover = "refined";  // or "greedy": the paper's
   int candidates = 1000;
   double coverage_goal = 0.98;
   double gain_min = 0.02;

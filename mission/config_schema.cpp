@@ -58,18 +58,23 @@ SectionSpec mission_section() {
 SectionSpec phase1_section() {
   using P = Phase1Config;
   const Keys<P> keys{[](MissionConfig& c) -> P& { return c.phase1; }};
-  return {ConfigFile::mission,
-          "phase1",
-          "The plan from the 2-D map (Algorithm 1).",
-          {keys.number("candidates", &P::candidates, 1, 1'000'000, "",
-                       "Random stations to choose from, in each area"),
-           keys.number("coverage_goal", &P::coverage_goal, 0.01, 1, "share",
-                       "Of the target wall that any candidate can see; stop there"),
-           keys.number("gain_min", &P::gain_min, 0, 1, "share",
-                       "Of the target wall; stop when the next station adds less"),
-           keys.number("overlap_min", &P::overlap_min, 0, 0.95, "share",
-                       "Of what a station sees that earlier stations must see too")},
-          {}};
+  return {
+      ConfigFile::mission,
+      "phase1",
+      "The plan from the 2-D map (Algorithm 1).",
+      {keys.other("cover", &P::cover,
+                  "How stations are chosen: as in the paper, or from there on to fewer stations "
+                  "and firmer links between scans",
+                  {"greedy", "refined"}),
+       keys.number("candidates", &P::candidates, 1, 1'000'000, "",
+                   "Random stations to choose from, in each area"),
+       keys.number("coverage_goal", &P::coverage_goal, 0.01, 1, "share",
+                   "Of the target wall that any candidate can see; stop there"),
+       keys.number("gain_min", &P::gain_min, 0, 1, "share",
+                   "Of the target wall; stop when the next station adds less"),
+       keys.number("overlap_min", &P::overlap_min, 0, 0.95, "share",
+                   "Of what a station sees that earlier stations must see too")},
+      {}};
 }
 
 SectionSpec phase2_section() {

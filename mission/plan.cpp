@@ -87,7 +87,9 @@ planning::SensorLimits sensor_limits(const ScannerConfig& scanner) {
 }
 
 planning::CoverConfig cover_config(const Phase1Config& phase1) {
-  return {.candidates = phase1.candidates,
+  return {.method = phase1.cover == "greedy" ? planning::CoverMethod::greedy
+                                             : planning::CoverMethod::refined,
+          .candidates = phase1.candidates,
           .coverage_goal = phase1.coverage_goal,
           .gain_min = phase1.gain_min,
           .overlap_min = phase1.overlap_min};

@@ -99,6 +99,18 @@ std::string walls(const Facts& facts) {
           report::gap_tables(facts));
 }
 
+std::string overlap(const Facts& facts) {
+  const std::string table = report::overlap_table(facts);
+  if (table.empty()) return "";
+  return section(
+      "How the scans hold together",
+      hint("Two stations are linked if they share enough wall for one scan to be registered "
+           "against the other. A weak link is the only one between two groups of stations: if "
+           "its scans cannot be matched, nothing but the robot's position joins the groups. Fewer "
+           "stations than are provable would not do for the same coverage.") +
+          table);
+}
+
 std::string truth(const RunRecord& run) {
   if (!run.truth) return "";
   const Truth& judged = *run.truth;
@@ -182,9 +194,11 @@ std::string report_html(const RunRecord& record, const ProductFacts& products) {
     out += section("Dropped stations", report::dropped_table(record));
   }
   out += section("Stations of Phase I",
-                 hint("In the order chosen. Adds: target wall not seen by the stations before it. "
+                 hint("In an order in which each overlaps those before it enough. Adds: target "
+                      "wall not seen by the stations before it. "
                       "Overlaps: seen by one of them already.") +
                      report::station_table(facts));
+  out += overlap(facts);
   out += section("Scans", hint("Poses as believed; times since the mission began. Resolved: of the "
                                "boundary unseen voxels that a next best view was predicted to "
                                "see, those no longer unseen.") +

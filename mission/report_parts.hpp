@@ -28,6 +28,7 @@ std::string pose_error_chart(const RunRecord& run);  // report_charts.cpp; empty
 std::string voxel_table(const RunRecord& run);  // The columns of the paper's Tables I and II.
 std::string coverage_table(const Facts& facts);
 std::string gap_tables(const Facts& facts);
+std::string overlap_table(const Facts& facts);  // With the weak links below; empty without a plan.
 std::string station_table(const Facts& facts);
 std::string scan_table(const RunRecord& run);
 std::string pose_table(const RunRecord& run);

@@ -199,9 +199,34 @@ std::string coverage_table(const Facts& facts) {
   std::string ends;
   for (const AreaPlan& plan : facts.record.plans) {
     if (plan.cover.end.empty()) continue;
-    ends += "<li><b>" + escaped(plan.area.name) + "</b>: " + escaped(plan.cover.end) + "</li>\n";
+    ends += "<li><b>" + escaped(plan.area.name) + "</b>: " + escaped(plan.cover.end) + " " +
+            escaped(plan.cover.bound) + "</li>\n";
   }
   return table.html() + (ends.empty() ? "" : "<ul class=\"small\">" + ends + "</ul>\n");
+}
+
+std::string overlap_table(const Facts& facts) {
+  Table table({{"Area", Align::word},
+               {"Stations"},
+               {"Provably at least"},
+               {"Paper's greedy"},
+               {"Links"},
+               {"Parts"},
+               {"Weak links"}});
+  std::string weak;
+  for (const AreaPlan& plan : facts.record.plans) {
+    const planning::CoverPlan& cover = plan.cover;
+    if (cover.stations.empty()) continue;
+    table.row({escaped(plan.area.name), std::to_string(cover.stations.size()),
+               std::to_string(cover.stations_at_least), std::to_string(cover.stations_greedy),
+               std::to_string(cover.overlap.links.size()), std::to_string(cover.overlap.parts),
+               std::to_string(cover.overlap.weak_links())},
+              cover.overlap.parts > 1 ? "alarm" : "");
+    for (const std::string& text : weaknesses(cover.overlap))
+      weak += "<li><b>" + escaped(plan.area.name) + "</b>: " + escaped(text) + "</li>\n";
+  }
+  if (table.empty()) return "";
+  return table.html() + (weak.empty() ? "" : "<ul class=\"small\">" + weak + "</ul>\n");
 }
 
 std::string gap_tables(const Facts& facts) {

@@ -59,6 +59,15 @@ json::array uncovered_json(const AreaPlan& plan, const AreaFacts& facts) {
   return pieces;
 }
 
+json::object overlap_json(const planning::OverlapGraph& graph) {
+  json::array weak_links;
+  for (const planning::OverlapLink& link : graph.links)
+    if (link.bridge)
+      weak_links.push_back(
+          {{"stations", {link.a + 1, link.b + 1}}, {"shared_m", mm(link.shared_m)}});
+  return {{"links", graph.links.size()}, {"parts", graph.parts}, {"weak_links", weak_links}};
+}
+
 json::object area_json(const AreaPlan& plan, const AreaFacts& facts) {
   const auto scanned = std::count_if(facts.scan_of_station.begin(), facts.scan_of_station.end(),
                                      [](int scan) { return scan >= 0; });
@@ -67,6 +76,10 @@ json::object area_json(const AreaPlan& plan, const AreaFacts& facts) {
                     {"stations_scanned", scanned}, {"tour_m", mm(plan.tour_m)}};
   add_coverage(area, coverage_of(plan, facts));
   area["end"] = plan.cover.end;
+  area["stations_greedy"] = plan.cover.stations_greedy;
+  area["stations_at_least"] = plan.cover.stations_at_least;
+  area["bound"] = plan.cover.bound;
+  area["overlap"] = overlap_json(plan.cover.overlap);
   area["uncovered_over_0.5_m"] = uncovered_json(plan, facts);
   return area;
 }

@@ -15,7 +15,7 @@ namespace {
 struct Quality {
   int parts{};
   int bridges{};
-  std::int64_t uncovered_nm{};
+  std::int64_t missing_nm{};  // Of all that candidates see.
 
   auto operator<=>(const Quality&) const = default;
 };
@@ -69,7 +69,8 @@ class Refinement {
   }
 
   std::vector<int> run(int at_least) {
-    fewer(static_cast<std::size_t>(std::max(1, at_least)));
+    best_ = fewer_sets(atoms_, candidates_, best_, {.at_least = at_least, .swaps = effort_.swaps},
+                       seed_, [&](const auto& chosen) { return ordered(chosen); });
     if (best_.size() == greedy_size_) atoms_.goal = greedy_nm_;
     hold_together();
     add_for_links();
@@ -77,28 +78,13 @@ class Refinement {
   }
 
  private:
-  // Takes out station after station and swaps others until the goal is reached again.
-  void fewer(std::size_t at_least) {
-    if (best_.size() <= at_least) return;
-    SwapSearch search(atoms_, candidates_, best_, seed_);
-    search.drop();
-    for (int swaps = 0; swaps < effort_.swaps; ++swaps) {
-      if (search.reaches_goal()) {
-        if (auto order = station_order(atoms_, search.chosen(), rules_)) {
-          best_ = *std::move(order);
-          if (best_.size() <= at_least) return;
-          search.drop();
-          swaps = 0;
-          continue;
-        }
-      }
-      if (!search.swap()) return;
-    }
+  std::optional<std::vector<int>> ordered(const std::vector<int>& stations) const {
+    return station_order(atoms_, stations, rules_);
   }
 
   Quality quality(const std::vector<int>& stations, std::int64_t covered_nm) {
     const GraphParts parts = links_.parts(stations);
-    return {parts.parts, static_cast<int>(parts.bridges.size()), -covered_nm};
+    return {parts.parts, static_cast<int>(parts.bridges.size()), total(atoms_) - covered_nm};
   }
 
   // Swaps on among covers of the same size, and keeps the best.
@@ -110,7 +96,7 @@ class Refinement {
       if (!search.reaches_goal()) continue;
       const Quality now = quality(search.chosen(), search.covered());
       if (now >= best) continue;
-      if (auto order = station_order(atoms_, search.chosen(), rules_)) {
+      if (auto order = ordered(search.chosen())) {
         best_ = *std::move(order);
         best = now;
       }
@@ -136,7 +122,7 @@ class Refinement {
     for (const auto& [then, candidate] : helpful) {
       std::vector<int> more = best_;
       more.push_back(candidate);
-      if (auto order = station_order(atoms_, more, rules_)) {
+      if (auto order = ordered(more)) {
         best_ = *std::move(order);
         return true;
       }

@@ -1,6 +1,7 @@
 #include "planning/set_cover_search.hpp"
 
 #include <algorithm>
+#include <stdexcept>
 #include <utility>
 
 namespace planning {
@@ -148,6 +149,51 @@ bool SwapSearch::swap() {
 void SwapSearch::press() {
   for (const int atom : required_)
     if (times_[index(atom)] == 0) price_[index(atom)] += problem_.weight[index(atom)];
+}
+
+std::vector<int> fewer_sets(const SetCover& problem, const std::vector<int>& candidates,
+                            const std::vector<int>& start, const SearchEffort& effort,
+                            std::uint64_t seed, const Accept& accept) {
+  std::vector<int> best = start;
+  const auto at_least = static_cast<std::size_t>(std::max(1, effort.at_least));
+  if (best.size() <= at_least) return best;
+  SwapSearch search(problem, candidates, best, seed);
+  search.drop();
+  for (int swaps = 0; swaps < effort.swaps; ++swaps) {
+    if (search.reaches_goal()) {
+      if (auto accepted = accept(search.chosen())) {
+        best = *std::move(accepted);
+        if (best.size() <= at_least) return best;
+        search.drop();
+        swaps = 0;
+        continue;
+      }
+    }
+    if (!search.swap()) return best;
+  }
+  return best;
+}
+
+std::vector<int> few_sets(const SetCover& problem, const SearchEffort& effort, std::uint64_t seed) {
+  std::vector<int> greedy;
+  for (std::int64_t so_far = 0; so_far < problem.goal;) {
+    std::int64_t most = so_far;
+    greedy.push_back(-1);
+    for (std::size_t i = 0; i < problem.sets.size(); ++i) {
+      std::vector<int> more = greedy;
+      more.back() = static_cast<int>(i);
+      if (const std::int64_t sum = covered(problem, more); sum > most) {
+        most = sum;
+        greedy.back() = static_cast<int>(i);
+      }
+    }
+    if (most == so_far) throw std::invalid_argument("all sets together miss the goal of the cover");
+    so_far = most;
+  }
+  auto best = fewer_sets(problem, undominated(problem), greedy, effort, seed,
+                         [](const std::vector<int>& chosen) { return std::optional(chosen); });
+  std::ranges::sort(best);
+  return best;
 }
 
 }  // namespace planning

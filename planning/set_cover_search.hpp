@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <random>
 #include <vector>
 
@@ -68,5 +70,23 @@ class SwapSearch {
   std::vector<std::int64_t> out_again_at_;  // By slot: when its set may leave.
   std::mt19937_64 random_;
 };
+
+// Of a cover that reaches the goal, what the caller makes of it; empty if it may not be used.
+using Accept = std::function<std::optional<std::vector<int>>(const std::vector<int>& chosen)>;
+
+struct SearchEffort {
+  int at_least{};    // Looks for no fewer sets.
+  int swaps = 2000;  // Without success, for each number of sets.
+};
+
+// Takes one set after the other from a cover that reaches the goal, and each time swaps others
+// until it is reached again, until that fails. The last cover as accept returned it, or `start`.
+std::vector<int> fewer_sets(const SetCover& problem, const std::vector<int>& candidates,
+                            const std::vector<int>& start, const SearchEffort& effort,
+                            std::uint64_t seed, const Accept& accept);
+
+// A cover with few sets, without further rules: greedy, then fewer_sets. Ascending. Throws
+// std::invalid_argument if all sets together miss the goal.
+std::vector<int> few_sets(const SetCover& problem, const SearchEffort& effort, std::uint64_t seed);
 
 }  // namespace planning
