@@ -1,10 +1,9 @@
 #include "planning/refine.hpp"
 
 #include <algorithm>
-#include <map>
-#include <tuple>
+#include <optional>
 
-#include "planning/overlap_graph.hpp"
+#include "planning/candidate_links.hpp"
 #include "planning/set_cover_search.hpp"
 #include "planning/station_order.hpp"
 
@@ -18,37 +17,6 @@ struct Quality {
   std::int64_t missing_nm{};  // Of all that candidates see.
 
   auto operator<=>(const Quality&) const = default;
-};
-
-// Links between candidates, worked out when first asked for.
-class Links {
- public:
-  Links(const std::vector<std::vector<Span>>& views, double overlap_min)
-      : views_(views), overlap_min_(overlap_min) {}
-
-  GraphParts parts(const std::vector<int>& stations) {
-    std::vector<std::pair<int, int>> edges;
-    for (std::size_t a = 0; a < stations.size(); ++a)
-      for (std::size_t b = 0; b < a; ++b)
-        if (is_linked(stations[a], stations[b])) edges.emplace_back(b, a);
-    return parts_of(static_cast<int>(stations.size()), edges);
-  }
-
- private:
-  bool is_linked(int a, int b) {
-    const auto [known, is_new] = known_.try_emplace(std::minmax(a, b));
-    if (is_new) {
-      const auto& view_a = views_[static_cast<std::size_t>(a)];
-      const auto& view_b = views_[static_cast<std::size_t>(b)];
-      known->second =
-          linked(length_nm(view_a), length_nm(view_b), shared_nm(view_a, view_b), overlap_min_);
-    }
-    return known->second;
-  }
-
-  const std::vector<std::vector<Span>>& views_;
-  double overlap_min_;
-  std::map<std::pair<int, int>, bool> known_;
 };
 
 class Refinement {
@@ -69,8 +37,10 @@ class Refinement {
   }
 
   std::vector<int> run(int at_least) {
-    best_ = fewer_sets(atoms_, candidates_, best_, {.at_least = at_least, .swaps = effort_.swaps},
-                       seed_, [&](const auto& chosen) { return ordered(chosen); });
+    best_ = fewer_sets(
+        atoms_, candidates_, best_, {.at_least = at_least, .swaps = effort_.swaps}, seed_,
+        [&](const auto& chosen) { return ordered(chosen); },
+        [&](const auto& chosen) { return links_.missing_nm(chosen); });
     if (best_.size() == greedy_size_) atoms_.goal = greedy_nm_;
     hold_together();
     add_for_links();
@@ -87,12 +57,19 @@ class Refinement {
     return {parts.parts, static_cast<int>(parts.bridges.size()), total(atoms_) - covered_nm};
   }
 
+  // A bridge is worth leaving 1 / 200 of all for a while, to get past it; a part three times that.
+  std::int64_t looseness_nm(const std::vector<int>& stations) {
+    const GraphParts parts = links_.parts(stations);
+    return (3 * (parts.parts - 1) + static_cast<int>(parts.bridges.size())) * total(atoms_) / 200;
+  }
+
   // Swaps on among covers of the same size, and keeps the best.
   void hold_together() {
     if (best_.size() < 2) return;
     SwapSearch search(atoms_, candidates_, best_, seed_ + 1);
     Quality best = quality(best_, search.covered());
-    for (int swaps = 0; swaps < effort_.swaps_links && search.swap(); ++swaps) {
+    const auto looseness = [&](const auto& chosen) { return looseness_nm(chosen); };
+    for (int swaps = 0; swaps < effort_.swaps_links && search.swap(looseness); ++swaps) {
       if (!search.reaches_goal()) continue;
       const Quality now = quality(search.chosen(), search.covered());
       if (now >= best) continue;
@@ -122,6 +99,7 @@ class Refinement {
     for (const auto& [then, candidate] : helpful) {
       std::vector<int> more = best_;
       more.push_back(candidate);
+      if (more.size() == greedy_size_ && covered(atoms_, more) < greedy_nm_) continue;
       if (auto order = ordered(more)) {
         best_ = *std::move(order);
         return true;
@@ -135,7 +113,7 @@ class Refinement {
   RefineEffort effort_;
   std::uint64_t seed_;
   std::vector<int> candidates_;
-  Links links_;
+  CandidateLinks links_;
   std::vector<int> best_;  // In an order that obeys the rules.
   std::size_t greedy_size_{};
   std::int64_t greedy_nm_{};

@@ -10,8 +10,8 @@ namespace planning {
 
 // Bounds of the search, in steps rather than time, so that its result is the same everywhere.
 struct RefineEffort {
-  int swaps = 2000;       // Without success, for each number of stations.
-  int swaps_links = 300;  // For better links, once the number stands.
+  int swaps = 800;        // Without success, for each number of stations, in each of three tries.
+  int swaps_links = 200;  // For better links, once the number stands.
 };
 
 // The greedy cover of these views, refined. `atoms` are wall_atoms(views, walls); nothing is asked

@@ -116,7 +116,7 @@ std::vector<std::vector<Run>> runs(const SetCover& problem) {
   for (const auto& set : problem.sets) {
     auto& of_set = all.emplace_back();
     for (const int atom : set) {
-      const auto a = static_cast<std::size_t>(atom);
+      const auto a = static_cast<std::uint32_t>(atom);
       if (of_set.empty() || of_set.back().to != a) of_set.push_back({a, a});
       ++of_set.back().to;
     }

@@ -29,7 +29,7 @@ std::vector<std::vector<int>> holders(const SetCover& problem);
 
 // Atoms from, ..., to - 1.
 struct Run {
-  std::size_t from{}, to{};
+  std::uint32_t from{}, to{};
 };
 // The atoms of each set as runs: few where atoms are pieces of walls, one after the other. With
 // sums over the first atoms, 0, 1, 2, ... of them, a set's sum costs its runs rather than its

@@ -116,26 +116,42 @@ void SwapSearch::drop() {
   refresh();
 }
 
-SwapSearch::Move SwapSearch::best_move() const {
-  Move best;
+std::vector<SwapSearch::Move> SwapSearch::best_moves(std::size_t count) const {
+  std::vector<Move> best;
   for (std::size_t slot = 0; slot < chosen_.size(); ++slot) {
     if (out_again_at_[slot] > now_) continue;
     const std::int64_t lost = loss(slot);
     for (const int i : candidates_) {
       if (is_chosen_[index(i)] || in_again_at_[index(i)] > now_) continue;
-      const std::int64_t delta = adds_[index(i)] + saves_[slot][index(i)] - lost;
-      const bool older = best.set >= 0 && in_again_at_[index(i)] < in_again_at_[index(best.set)];
-      if (best.set < 0 || delta > best.delta || (delta == best.delta && older))
-        best = {slot, i, delta};
+      const Move move{slot, i, adds_[index(i)] + saves_[slot][index(i)] - lost,
+                      in_again_at_[index(i)]};
+      if (best.size() == count && !(best.back() < move)) continue;
+      if (best.size() == count) best.pop_back();
+      const auto place = std::partition_point(best.begin(), best.end(),
+                                              [&](const Move& other) { return !(other < move); });
+      best.insert(place, move);
     }
   }
   return best;
 }
 
-bool SwapSearch::swap() {
+SwapSearch::Move SwapSearch::least_penalised(std::vector<Move> moves,
+                                             const Penalty& penalty) const {
+  std::vector<int> after = chosen_;
+  for (Move& move : moves) {
+    const int before = std::exchange(after[move.slot], move.set);
+    move.delta -= penalty(after);
+    after[move.slot] = before;
+  }
+  return *std::ranges::max_element(moves,
+                                   [](const Move& a, const Move& b) { return a.delta < b.delta; });
+}
+
+bool SwapSearch::swap(const Penalty& penalty) {
   ++now_;
-  const Move move = best_move();
-  if (move.set < 0) return false;
+  const std::vector<Move> moves = best_moves(penalty ? kLooked : 1);
+  if (moves.empty()) return false;
+  const Move move = penalty ? least_penalised(moves, penalty) : moves.front();
   in_again_at_[index(chosen_[move.slot])] =
       now_ + static_cast<std::int64_t>(kOutMin + random_() % kOutSpread);
   out_again_at_[move.slot] = now_ + static_cast<std::int64_t>(kKeepMin + random_() % kKeepSpread);
@@ -151,25 +167,40 @@ void SwapSearch::press() {
     if (times_[index(atom)] == 0) price_[index(atom)] += problem_.weight[index(atom)];
 }
 
-std::vector<int> fewer_sets(const SetCover& problem, const std::vector<int>& candidates,
-                            const std::vector<int>& start, const SearchEffort& effort,
-                            std::uint64_t seed, const Accept& accept) {
-  std::vector<int> best = start;
-  const auto at_least = static_cast<std::size_t>(std::max(1, effort.at_least));
-  if (best.size() <= at_least) return best;
-  SwapSearch search(problem, candidates, best, seed);
+namespace {
+
+// One try: makes `best` smaller as far as it comes. Whether accept refused anything.
+bool try_fewer(SwapSearch search, std::vector<int>& best, const SearchEffort& effort,
+               const Accept& accept, const Penalty& penalty) {
+  bool refused = false;
   search.drop();
   for (int swaps = 0; swaps < effort.swaps; ++swaps) {
     if (search.reaches_goal()) {
       if (auto accepted = accept(search.chosen())) {
         best = *std::move(accepted);
-        if (best.size() <= at_least) return best;
+        if (static_cast<int>(best.size()) <= std::max(1, effort.at_least)) return false;
         search.drop();
         swaps = 0;
         continue;
       }
+      refused = true;
     }
-    if (!search.swap()) return best;
+    if (!search.swap(penalty)) return refused;
+  }
+  return refused;
+}
+
+}  // namespace
+
+std::vector<int> fewer_sets(const SetCover& problem, const std::vector<int>& candidates,
+                            const std::vector<int>& start, const SearchEffort& effort,
+                            std::uint64_t seed, const Accept& accept, const Penalty& penalty) {
+  std::vector<int> best = start;
+  bool refused = false;
+  for (int tried = 0; tried < effort.tries; ++tried) {
+    if (static_cast<int>(best.size()) <= std::max(1, effort.at_least)) break;
+    SwapSearch search(problem, candidates, best, seed + static_cast<std::uint64_t>(tried));
+    refused |= try_fewer(std::move(search), best, effort, accept, refused ? penalty : Penalty{});
   }
   return best;
 }

@@ -11,6 +11,10 @@
 
 namespace planning {
 
+// What is wrong with these chosen sets apart from what they do not cover, in units of weight.
+using Penalty = std::function<std::int64_t(const std::vector<int>& chosen)>;
+inline constexpr std::size_t kLooked = 64;
+
 // Holds some chosen sets and, kept up to date, what every exchange of one of them would change:
 // what a set would add (atoms that none holds), and what it would save of the atoms that one
 // chosen set alone holds (as in the swap search of Resende and Werneck for p-median). Each swap is
@@ -31,14 +35,20 @@ class SwapSearch {
 
   // Takes out the set whose loss is least. At least one must be chosen.
   void drop();
-  // Makes the best swap that is not tabu. False if there is none.
-  bool swap();
+  // Makes the best swap that is not tabu. False if there is none. With a penalty: of the
+  // kLooked swaps that cover most, the one that covers most less its penalty.
+  bool swap(const Penalty& penalty = {});
 
  private:
   struct Move {
     std::size_t slot{};
     int set = -1;
     std::int64_t delta{};
+    std::int64_t since{};  // When the set left last, if it ever did.
+
+    bool operator<(const Move& other) const {  // Worse; among equals: left later.
+      return delta != other.delta ? delta < other.delta : since > other.since;
+    }
   };
 
   void put(std::size_t slot, int set);
@@ -47,7 +57,8 @@ class SwapSearch {
   void refresh();  // adds_ and those of saves_ that changed.
   template <class Counts>
   void sum_up(std::vector<std::int64_t>& of_sets, const Counts& counts);
-  Move best_move() const;
+  std::vector<Move> best_moves(std::size_t count) const;  // Best first.
+  Move least_penalised(std::vector<Move> moves, const Penalty& penalty) const;
   std::int64_t loss(std::size_t slot) const;
 
   const SetCover& problem_;
@@ -71,19 +82,21 @@ class SwapSearch {
   std::mt19937_64 random_;
 };
 
-// Of a cover that reaches the goal, what the caller makes of it; empty if it may not be used.
+// Of a cover that reaches the goal: what the caller makes of it; empty if it may not be used.
 using Accept = std::function<std::optional<std::vector<int>>(const std::vector<int>& chosen)>;
 
 struct SearchEffort {
-  int at_least{};    // Looks for no fewer sets.
-  int swaps = 2000;  // Without success, for each number of sets.
+  int at_least{};   // Looks for no fewer sets.
+  int swaps = 800;  // In a try, without success, for each number of sets.
+  int tries = 3;    // From the best so far.
 };
 
 // Takes one set after the other from a cover that reaches the goal, and each time swaps others
 // until it is reached again, until that fails. The last cover as accept returned it, or `start`.
+// Where a try met covers that accept refused, the next ones mind the penalty.
 std::vector<int> fewer_sets(const SetCover& problem, const std::vector<int>& candidates,
                             const std::vector<int>& start, const SearchEffort& effort,
-                            std::uint64_t seed, const Accept& accept);
+                            std::uint64_t seed, const Accept& accept, const Penalty& penalty = {});
 
 // A cover with few sets, without further rules: greedy, then fewer_sets. Ascending. Throws
 // std::invalid_argument if all sets together miss the goal.

@@ -84,7 +84,7 @@ TEST(SetCover, RunsHoldTheSameAtoms) {
   for (std::size_t i = 0; i < problem.sets.size(); ++i) {
     std::vector<int> atoms;
     for (const auto& [from, to] : as_runs[i])
-      for (std::size_t a = from; a < to; ++a) atoms.push_back(static_cast<int>(a));
+      for (auto a = from; a < to; ++a) atoms.push_back(static_cast<int>(a));
     EXPECT_EQ(atoms, problem.sets[i]);
   }
 }
