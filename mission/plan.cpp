@@ -79,22 +79,6 @@ void order_tasks(SiteTasks& tasks, int home) {
   tasks.tasks = std::move(sorted);
 }
 
-planning::SensorLimits sensor_limits(const ScannerConfig& scanner) {
-  return {.range_min_m = scanner.range_min_m,
-          .range_max_m = scanner.range_max_m,
-          .grazing_max_deg = scanner.grazing_max_deg,
-          .fov_deg = scanner.fov_deg};
-}
-
-planning::CoverConfig cover_config(const Phase1Config& phase1) {
-  return {.method = phase1.cover == "greedy" ? planning::CoverMethod::greedy
-                                             : planning::CoverMethod::refined,
-          .candidates = phase1.candidates,
-          .coverage_goal = phase1.coverage_goal,
-          .gain_min = phase1.gain_min,
-          .overlap_min = phase1.overlap_min};
-}
-
 hal::Pose2 pose_of(const planning::Candidate& candidate) {
   return {nav::to_m(candidate.position), candidate.heading_rad};
 }
@@ -162,6 +146,22 @@ SiteTasks assign_areas(const MissionConfig& config, const nav::SiteMap& map,
                     result.start.position_m.x(), result.start.position_m.y(), area.name));
   }
   return result;
+}
+
+planning::SensorLimits sensor_limits(const ScannerConfig& scanner) {
+  return {.range_min_m = scanner.range_min_m,
+          .range_max_m = scanner.range_max_m,
+          .grazing_max_deg = scanner.grazing_max_deg,
+          .fov_deg = scanner.fov_deg};
+}
+
+planning::CoverConfig cover_config(const Phase1Config& phase1) {
+  return {.method = phase1.cover == "greedy" ? planning::CoverMethod::greedy
+                                             : planning::CoverMethod::refined,
+          .candidates = phase1.candidates,
+          .coverage_goal = phase1.coverage_goal,
+          .gain_min = phase1.gain_min,
+          .overlap_min = phase1.overlap_min};
 }
 
 std::string station_name(const AreaPlan& plan, int station) {

@@ -46,6 +46,10 @@ PlannedArea plan_area(const MissionConfig& config, const nav::SiteMap& map, cons
                       const std::optional<Eigen::Vector2d>& start_m, std::uint64_t seed,
                       int threads);
 
+// What the config says, as planning takes it.
+planning::SensorLimits sensor_limits(const ScannerConfig& scanner);
+planning::CoverConfig cover_config(const Phase1Config& phase1);
+
 std::string station_name(const AreaPlan& plan, int station);
 
 }  // namespace mission

@@ -167,6 +167,7 @@ GreedyCover chosen_cover(const std::vector<std::vector<Span>>& views, std::size_
   plan.stations_greedy = static_cast<int>(cover.picks.size());
   SetCover atoms = wall_atoms(views, walls);
   atoms.goal = std::min(rules.goal_nm, covered_nm(cover));
+  plan.goal_m = nm_to_m(atoms.goal);
   plan.stations_at_least = stations_at_least(atoms, plan.stations_greedy);
   if (method == CoverMethod::refined)
     cover = refined_cover(views, walls, atoms, rules, cover, plan.stations_at_least, seed);
@@ -217,6 +218,14 @@ CoverPlan plan_cover(const nav::FreeArea& area, const std::vector<Wall>& walls,
     return std::pair(p.piece.wall, p.piece.from_m) < std::pair(q.piece.wall, q.piece.from_m);
   });
   return plan;
+}
+
+SetCover cover_problem(const CoverPlan& plan, const std::vector<Wall>& walls,
+                       const SensorLimits& limits, int threads) {
+  SetCover problem =
+      wall_atoms(views_of(plan.candidates, Visibility(walls, limits), threads), walls.size());
+  problem.goal = to_nm(plan.goal_m);
+  return problem;
 }
 
 }  // namespace planning

@@ -9,6 +9,7 @@
 #include "nav/geometry.hpp"
 #include "nav/site_map.hpp"
 #include "planning/overlap_graph.hpp"
+#include "planning/set_cover.hpp"
 #include "planning/visibility.hpp"
 
 namespace planning {
@@ -63,8 +64,8 @@ struct CoverPlan {
   double covered_m{};
   std::string end;          // Why it stopped, in a sentence.
   int stations_greedy{};    // How many the paper's greedy cover takes.
-  int stations_at_least{};  // Proven: no fewer of these candidates cover the goal, or as much as
-                            // the greedy cover where that falls short of it (cover_bound.hpp).
+  double goal_m{};          // coverage_goal, or what the greedy cover covers if that is less.
+  int stations_at_least{};  // Proven: no fewer of these candidates cover goal_m (cover_bound.hpp).
   std::string bound;        // "30 stations; provably at least 26."
   OverlapGraph overlap;     // Of the stations.
 };
@@ -85,5 +86,10 @@ std::vector<Candidate> draw_candidates(const nav::FreeArea& area, int count, dou
 CoverPlan plan_cover(const nav::FreeArea& area, const std::vector<Wall>& walls,
                      const SensorLimits& limits, const CoverConfig& config, std::uint64_t seed,
                      int threads);
+
+// The problem that plan.stations_at_least is about: the walls as atoms, the candidates as sets,
+// goal_m as the goal.
+SetCover cover_problem(const CoverPlan& plan, const std::vector<Wall>& walls,
+                       const SensorLimits& limits, int threads);
 
 }  // namespace planning

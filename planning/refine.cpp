@@ -30,9 +30,9 @@ class Refinement {
         seed_(seed),
         candidates_(undominated(atoms)),
         links_(views, rules.overlap_min) {
-    for (const Pick& pick : greedy.picks) best_.push_back(pick.candidate);
-    greedy_size_ = best_.size();
-    greedy_nm_ = covered(atoms_, best_);
+    for (const Pick& pick : greedy.picks) greedy_.push_back(pick.candidate);
+    best_ = greedy_;
+    greedy_nm_ = covered(atoms_, greedy_);
     atoms_.goal = std::min(rules.goal_nm, greedy_nm_);
   }
 
@@ -41,9 +41,9 @@ class Refinement {
         atoms_, candidates_, best_, {.at_least = at_least, .swaps = effort_.swaps}, seed_,
         [&](const auto& chosen) { return ordered(chosen); },
         [&](const auto& chosen) { return links_.missing_nm(chosen); });
-    if (best_.size() == greedy_size_) atoms_.goal = greedy_nm_;
+    if (best_.size() == greedy_.size()) atoms_.goal = greedy_nm_;
     hold_together();
-    add_for_links();
+    if (!is_firm()) spend_spare_stations();
     return best_;
   }
 
@@ -80,9 +80,22 @@ class Refinement {
     }
   }
 
-  void add_for_links() {
-    while (best_.size() < greedy_size_ && add_one_for_links()) {
+  bool is_firm() {
+    const GraphParts parts = links_.parts(best_);
+    return parts.parts == 1 && parts.bridges.empty();
+  }
+
+  // Up to greedy's number of stations, if that leaves no weak link: by adding some, else by going
+  // back to greedy's.
+  void spend_spare_stations() {
+    const std::vector<int> fewest = best_;
+    while (best_.size() < greedy_.size() && !is_firm() && add_one_for_links()) {
     }
+    if (is_firm() || fewest.size() == greedy_.size()) return;
+    best_ = greedy_;
+    atoms_.goal = greedy_nm_;
+    hold_together();
+    if (!is_firm()) best_ = fewest;
   }
 
   // Adds the station that leaves the fewest parts and bridges, if fewer than now.
@@ -99,7 +112,7 @@ class Refinement {
     for (const auto& [then, candidate] : helpful) {
       std::vector<int> more = best_;
       more.push_back(candidate);
-      if (more.size() == greedy_size_ && covered(atoms_, more) < greedy_nm_) continue;
+      if (more.size() == greedy_.size() && covered(atoms_, more) < greedy_nm_) continue;
       if (auto order = ordered(more)) {
         best_ = *std::move(order);
         return true;
@@ -115,7 +128,7 @@ class Refinement {
   std::vector<int> candidates_;
   CandidateLinks links_;
   std::vector<int> best_;  // In an order that obeys the rules.
-  std::size_t greedy_size_{};
+  std::vector<int> greedy_;
   std::int64_t greedy_nm_{};
 };
 

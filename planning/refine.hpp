@@ -19,8 +19,8 @@ struct RefineEffort {
 // covers if that is less; or as many that cover no less. The picks are in an order in which each
 // overlaps those before it and adds enough, as the rules ask; where the search ends without the
 // goal, greedy picks follow as long as they may. Of covers with the same number of stations the one
-// whose overlap graph has fewer parts, then fewer bridges, then covers more; and a station is added
-// for fewer parts or bridges, up to greedy's number.
+// whose overlap graph has fewer parts, then fewer bridges, then covers more. If weak links are
+// left, up to greedy's number of stations are spent where that leaves none.
 //
 // Never looks for fewer than at_least stations. Same seed, same result.
 GreedyCover refined_cover(const std::vector<std::vector<Span>>& views, std::size_t walls,

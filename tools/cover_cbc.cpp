@@ -15,6 +15,7 @@ namespace {
 constexpr double kTolerance = 1e-5;  // Of CBC's bound; counts of sets are whole numbers.
 
 struct Cells {
+  bool are_atoms{};
   std::vector<int> of_atom;
   std::vector<double> share;  // Of all weight.
 };
@@ -22,7 +23,7 @@ struct Cells {
 Cells cells_of(const planning::SetCover& problem, int cells_max) {
   const auto all = static_cast<double>(total(problem));
   const bool alone = problem.atoms() <= static_cast<std::size_t>(cells_max);
-  Cells cells;
+  Cells cells{.are_atoms = alone, .of_atom = {}, .share = {}};
   double sum = 0, last = -1;
   for (const std::int64_t weight : problem.weight) {
     const double place = alone ? last + 1 : std::floor(sum * cells_max);
@@ -55,7 +56,7 @@ class Programme {
     const double goal = static_cast<double>(problem.goal) / static_cast<double>(total(problem));
     for (int k = 0; k < rows; ++k) {
       const double share = cells.share[static_cast<std::size_t>(k)];
-      const bool required = share > 1 - goal + 1e-9;
+      const bool required = cells.are_atoms && share > 1 - goal + 1e-9;
       add({{k, -1}, {rows, share}}, required ? 1 : 0, 0);
     }
     row_low_.assign(static_cast<std::size_t>(rows) + 1, 0);

@@ -104,6 +104,22 @@ TEST(Report, HasThePapersTablesWithPhaseIFirst) {
                   html::number(static_cast<double>(last.after.unseen), 0))));
 }
 
+TEST(Report, NamesTheBoundAndEveryWeakLink) {
+  RunRecord run = test::sample_record(0);
+  std::string html = report_html(run, {});
+  for (const AreaPlan& plan : run.plans) {
+    EXPECT_TRUE(has(html, plan.cover.bound));
+    const auto texts = weaknesses(plan.cover.overlap);
+    ASSERT_EQ(texts.size(), 1U);
+    EXPECT_TRUE(has(html, fmt::format("<b>{}</b>: {}", plan.area.name, texts[0])));
+  }
+  EXPECT_EQ(times(html, "weak link: station"), run.plans.size());
+  for (AreaPlan& plan : run.plans)
+    for (auto& link : plan.cover.overlap.links) link.bridge = false;
+  html = report_html(run, {});
+  EXPECT_FALSE(has(html, "weak link: station"));
+}
+
 TEST(Report, EscapesEveryNameFromOutside) {
   RunRecord run = test::sample_record(3);
   const std::string evil = "<script>alert(\"x\")</script>&'\xFF";

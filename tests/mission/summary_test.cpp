@@ -44,6 +44,26 @@ TEST(Summary, CoverageOfTheAreasAddsUp) {
               coverage.at("covered_m").as_double() / coverage.at("coverable_m").as_double(), 1e-4);
 }
 
+TEST(Summary, TellsTheBoundAndTheWeakLinksOfEveryArea) {
+  const RunRecord run = test::sample_record();
+  const json::value summary = summarise(run, {});
+  const json::array& areas = summary.at_pointer("/coverage/areas").as_array();
+  ASSERT_EQ(areas.size(), run.plans.size());
+  for (std::size_t i = 0; i < areas.size(); ++i) {
+    const auto& cover = run.plans[i].cover;
+    EXPECT_EQ(areas[i].at("stations_at_least"), cover.stations_at_least);
+    EXPECT_EQ(areas[i].at("stations_greedy"), cover.stations_greedy);
+    EXPECT_EQ(areas[i].at("bound").as_string(), cover.bound);
+    const json::value& overlap = areas[i].at("overlap");
+    EXPECT_EQ(overlap.at("links"), cover.overlap.links.size());
+    EXPECT_EQ(overlap.at("parts"), 1);
+    const json::array& weak = overlap.at("weak_links").as_array();
+    ASSERT_EQ(weak.size(), 1u);
+    EXPECT_EQ(weak[0].at("stations").as_array()[1], cover.stations.size());  // Counted from 1.
+    EXPECT_GT(weak[0].at("shared_m").as_double(), 3);
+  }
+}
+
 TEST(Summary, ListsEveryUncoveredPieceOverHalfAMetreWithItsReason) {
   const json::value summary = summarise(test::sample_record(), {});
   std::size_t pieces = 0;

@@ -23,14 +23,14 @@ struct Views {
   std::size_t walls = 4;
 };
 
-// Short walls and coarse ends, so that much is equal.
-inline Views random_views(Dice& dice, int count) {
+// Short walls and coarse ends, multiples of unit_nm, so that much is equal.
+inline Views random_views(Dice& dice, int count, std::int64_t unit_nm = 10) {
   Views made{std::vector<std::vector<Span>>(static_cast<std::size_t>(count)), 4};
   for (auto& view : made.views) {
     SpanSet seen(made.walls);
     for (int i = dice.below(6); i > 0; --i) {
-      const int from = 10 * dice.below(40);
-      seen.add(Span{dice.below(4), from, from + 20 + 10 * dice.below(12)});
+      const int from = dice.below(40), wall = dice.below(4), to = from + 2 + dice.below(12);
+      seen.add(Span{wall, unit_nm * from, unit_nm * to});
     }
     view = seen.spans();
   }
@@ -90,6 +90,28 @@ inline bool obeys_literally(const Views& v, const std::vector<int>& order,
     seen.add(view);
   }
   return true;
+}
+
+// Asks every candidate every time.
+inline std::vector<planning::Pick> plain_greedy(const std::vector<std::vector<Span>>& views,
+                                                std::size_t walls, const CoverRules& rules) {
+  std::vector<planning::Pick> picks;
+  SpanSet covered(walls);
+  while (covered.total_nm() == 0 || covered.total_nm() < rules.goal_nm) {
+    planning::Pick best{-1, 0, 0};
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const std::int64_t overlaps = covered.overlap_nm(views[i]);
+      const std::int64_t adds = length_nm(views[i]) - overlaps;
+      const bool enough =
+          static_cast<double>(overlaps) >= rules.overlap_min * static_cast<double>(adds + overlaps);
+      if (!picks.empty() && !enough) continue;
+      if (adds > best.adds_nm) best = {static_cast<int>(i), adds, overlaps};
+    }
+    if (best.candidate < 0 || best.adds_nm < rules.gain_min_nm) break;
+    picks.push_back(best);
+    covered.add(views[static_cast<std::size_t>(best.candidate)]);
+  }
+  return picks;
 }
 
 }  // namespace cover_problems

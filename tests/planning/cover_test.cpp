@@ -12,6 +12,7 @@
 #include "nav/polygons.hpp"
 #include "planning/greedy.hpp"
 #include "planning/spans.hpp"
+#include "tests/planning/cover_problems.hpp"
 #include "tests/planning/visibility_oracle.hpp"
 #include "tests/support/random_site.hpp"
 
@@ -256,52 +257,20 @@ TEST(Spans, GapsOfRoundingAreClosed) {
 
 // --- Greedy cover
 
-// Asks every candidate every time.
-std::vector<Pick> plain_greedy(const std::vector<std::vector<Span>>& views, std::size_t walls,
-                               const CoverRules& rules) {
-  std::vector<Pick> picks;
-  SpanSet covered(walls);
-  while (covered.total_nm() == 0 || covered.total_nm() < rules.goal_nm) {
-    Pick best{-1, 0, 0};
-    for (std::size_t i = 0; i < views.size(); ++i) {
-      const std::int64_t overlaps = covered.overlap_nm(views[i]);
-      const std::int64_t adds = length_nm(views[i]) - overlaps;
-      const bool enough =
-          static_cast<double>(overlaps) >= rules.overlap_min * static_cast<double>(adds + overlaps);
-      if (!picks.empty() && !enough) continue;
-      if (adds > best.adds_nm) best = {static_cast<int>(i), adds, overlaps};
-    }
-    if (best.candidate < 0 || best.adds_nm < rules.gain_min_nm) break;
-    picks.push_back(best);
-    covered.add(views[static_cast<std::size_t>(best.candidate)]);
-  }
-  return picks;
-}
-
 TEST(GreedyCover, LazyPicksAreThoseOfPlainGreedy) {
   Dice dice(21);
   std::map<CoverEnd, int> ends;
   std::size_t picks = 0;
   for (int round = 0; round < 3000; ++round) {
-    const std::size_t walls = 4;
-    std::vector<std::vector<Span>> views(static_cast<std::size_t>(dice.below(40)));
-    std::int64_t all = 0;
+    const auto [views, walls] = cover_problems::random_views(dice, dice.below(40), 1);
     SpanSet coverable(walls);
-    for (auto& view : views) {
-      SpanSet seen(walls);
-      for (int i = dice.below(6); i > 0; --i) {
-        const int from = dice.below(40);  // Coarse, so that many are equal.
-        seen.add(Span{dice.below(4), from, from + 2 + dice.below(12)});
-      }
-      view = seen.spans();
-      coverable.add(seen);
-    }
-    all = coverable.total_nm();
+    for (const auto& view : views) coverable.add(view);
+    const std::int64_t all = coverable.total_nm();
     const CoverRules rules{.goal_nm = all * (70 + dice.below(31)) / 100,
                            .gain_min_nm = dice.below(6),
                            .overlap_min = 0.1 * dice.below(7)};
     const GreedyCover lazy = greedy_cover(views, walls, rules);
-    ASSERT_EQ(lazy.picks, plain_greedy(views, walls, rules)) << round;
+    ASSERT_EQ(lazy.picks, cover_problems::plain_greedy(views, walls, rules)) << round;
     ++ends[lazy.end];
     picks += lazy.picks.size();
   }
