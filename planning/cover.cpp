@@ -4,10 +4,8 @@
 #include <cmath>
 
 #include "nav/words.hpp"
-#include "planning/cover_bound.hpp"
-#include "planning/greedy.hpp"
-#include "planning/refine.hpp"
 #include "planning/spans.hpp"
+#include "planning/station_choice.hpp"
 #include "planning/voxel_parallel.hpp"
 
 namespace planning {
@@ -159,20 +157,24 @@ std::string bound_in_words(std::size_t stations, int at_least) {
                      : "at least " + std::to_string(at_least) + ".");
 }
 
-// The cover that the method asks for, and what the plan says of it beside.
-GreedyCover chosen_cover(const std::vector<std::vector<Span>>& views, std::size_t walls,
-                         const CoverRules& rules, CoverMethod method, std::uint64_t seed,
-                         CoverPlan& plan) {
-  GreedyCover cover = greedy_cover(views, walls, rules);
-  plan.stations_greedy = static_cast<int>(cover.picks.size());
-  SetCover atoms = wall_atoms(views, walls);
-  atoms.goal = std::min(rules.goal_nm, covered_nm(cover));
-  plan.goal_m = nm_to_m(atoms.goal);
-  plan.stations_at_least = stations_at_least(atoms, plan.stations_greedy);
-  if (method == CoverMethod::refined)
-    cover = refined_cover(views, walls, atoms, rules, cover, plan.stations_at_least, seed);
-  plan.bound = bound_in_words(cover.picks.size(), plan.stations_at_least);
-  return cover;
+// What they cover together.
+SpanSet add_stations(const GreedyCover& cover, const std::vector<std::vector<Span>>& views,
+                     std::size_t walls, CoverPlan& plan) {
+  SpanSet covered(walls);
+  for (const Pick& pick : cover.picks) {
+    const auto i = static_cast<std::size_t>(pick.candidate);
+    plan.stations.push_back(station(plan.candidates[i], views[i], pick));
+    covered.add(views[i]);
+  }
+  return covered;
+}
+
+OverlapGraph overlap_of(const GreedyCover& cover, const std::vector<std::vector<Span>>& views,
+                        double overlap_min) {
+  std::vector<std::vector<Span>> chosen;
+  for (const Pick& pick : cover.picks)
+    chosen.push_back(views[static_cast<std::size_t>(pick.candidate)]);
+  return overlap_graph(chosen, overlap_min);
 }
 
 // Rounded up, so that reaching it is reaching the share.
@@ -196,21 +198,19 @@ CoverPlan plan_cover(const nav::FreeArea& area, const std::vector<Wall>& walls,
   const CoverRules rules{.goal_nm = share_of(config.coverage_goal, coverable.total_nm()),
                          .gain_min_nm = share_of(config.gain_min, targets.total_nm()),
                          .overlap_min = config.overlap_min};
-  const GreedyCover cover = chosen_cover(views, walls.size(), rules, config.method, seed, plan);
-
-  SpanSet covered(walls.size());
-  std::vector<std::vector<Span>> chosen_views;
-  for (const Pick& pick : cover.picks) {
-    const auto i = static_cast<std::size_t>(pick.candidate);
-    plan.stations.push_back(station(plan.candidates[i], views[i], pick));
-    chosen_views.push_back(views[i]);
-    covered.add(views[i]);
-  }
-  plan.overlap = overlap_graph(chosen_views, config.overlap_min);
+  const StationChoice choice =
+      choose_stations(views, walls.size(), rules, config.method == CoverMethod::refined, seed);
+  const GreedyCover& cover = choice.cover;
+  const SpanSet covered = add_stations(cover, views, walls.size(), plan);
+  plan.overlap = overlap_of(cover, views, config.overlap_min);
   plan.target_m = nm_to_m(targets.total_nm());
   plan.coverable_m = nm_to_m(coverable.total_nm());
   plan.covered_m = nm_to_m(covered.total_nm());
   plan.end = in_words(cover, plan, config);
+  plan.stations_greedy = choice.greedy;
+  plan.goal_m = nm_to_m(choice.goal_nm);
+  plan.stations_at_least = choice.at_least;
+  plan.bound = bound_in_words(plan.stations.size(), choice.at_least);
 
   tell_missed(targets.minus(coverable), plan.candidates, visibility, threads, plan.uncovered);
   tell_left(coverable.minus(covered), covered, cover, views, rules, plan.uncovered);

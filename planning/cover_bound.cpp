@@ -92,7 +92,8 @@ class PriceSearch {
   std::vector<std::int64_t> whole_prices() const {
     std::vector<std::int64_t> whole;
     const double unit = static_cast<double>(kSetCost) / static_cast<double>(total(problem_));
-    for (const double price : best_) whole.push_back(std::llround(price * unit));
+    for (const double price : best_)  // Above the cost of a set there is nothing to gain.
+      whole.push_back(std::llround(std::clamp(price * unit, 0.0, 1.0 * kSetCost)));
     return whole;
   }
 

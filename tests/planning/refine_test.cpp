@@ -6,6 +6,7 @@
 #include "planning/cover.hpp"
 #include "planning/cover_bound.hpp"
 #include "planning/overlap_graph.hpp"
+#include "planning/station_choice.hpp"
 #include "planning/station_order.hpp"
 #include "tests/planning/cover_problems.hpp"
 #include "tools/cover_cbc.hpp"
@@ -162,6 +163,28 @@ TEST(RefinedCover, HoldsTogetherNoWorseThanGreedyWithAsManyStations) {
     firmer += is < was;
   }
   EXPECT_GT(firmer, 10);
+}
+
+TEST(ChooseStations, KeepsItsPromisesBeyondTheCandidatesItTakesInFull) {
+  Dice dice(7);
+  int fewer = 0;
+  for (int round = 0; round < 60; ++round) {
+    const Case c = random_case(dice, 60);
+    const int in_all = stations_at_least(c.atoms, static_cast<int>(c.greedy.picks.size()));
+    for (const std::size_t in_full : {5u, 20u, 60u}) {
+      const StationChoice choice = choose_stations(c.v.views, c.v.walls, c.rules, true, 1, in_full);
+      EXPECT_EQ(choice.greedy, static_cast<int>(c.greedy.picks.size()));
+      EXPECT_LE(choice.cover.picks.size(), c.greedy.picks.size());
+      EXPECT_LE(choice.at_least, static_cast<int>(choice.cover.picks.size()));
+      EXPECT_LE(choice.at_least, in_all + 1);
+      EXPECT_GE(covered_nm(choice.cover), choice.goal_nm);
+      EXPECT_TRUE(obeys_literally(c.v, candidates(choice.cover), c.rules));
+      fewer += choice.cover.picks.size() < c.greedy.picks.size();
+    }
+    EXPECT_EQ(choose_stations(c.v.views, c.v.walls, c.rules, false, 1, 5).cover.picks,
+              c.greedy.picks);
+  }
+  EXPECT_GT(fewer, 10);
 }
 
 // Stations in a random yard, against the integer programme; without the rules, which it lacks.

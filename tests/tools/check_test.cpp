@@ -163,6 +163,26 @@ TEST_F(Vantage, EveryShippedMissionThatNamesASiteIsFine) {
   EXPECT_GE(checked, 5);
 }
 
+TEST_F(Vantage, CoverJudgesThePlanOfEveryArea) {
+  write_site("yard");
+  const auto mission = write("m.toml", "site = 'yard'\n[phase1]\ncandidates = 60\n");
+  const auto outcome = run("cover --exact-s 30 " + mission.string());
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  std::istringstream text(outcome.out);
+  std::string heading, area;
+  std::getline(text, heading);
+  EXPECT_THAT(heading, HasSubstr("CBC at least"));
+  int greedy = 0, refined = 0, at_least = 0, exact = 0, exact_at_least = 0;
+  ASSERT_TRUE(text >> area >> greedy >> refined >> at_least >> exact >> exact_at_least);
+  EXPECT_EQ(area, "yard");
+  EXPECT_GE(greedy, refined);
+  EXPECT_GE(refined, exact);
+  EXPECT_GE(exact, exact_at_least);
+  EXPECT_GE(exact, at_least);
+  EXPECT_GE(at_least, 2);  // Nobody sees a hut from all sides at once.
+  EXPECT_EQ(run("cover nowhere.toml").code, 2);
+}
+
 TEST_F(Vantage, HelpHasExamplesAndWrongUseIsTold) {
   const auto help = run("--help");
   EXPECT_EQ(help.code, 0);
