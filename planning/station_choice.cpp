@@ -34,6 +34,11 @@ SetCover coarse_atoms(const Views& views, std::size_t walls) {
   return wall_atoms(widened(views, walls, seen.total_nm() / cells + 1), walls);
 }
 
+// More where they cost less.
+int bound_rounds(const SetCover& atoms) {
+  return std::clamp(20'000'000 / static_cast<int>(atoms.atoms() + 1), 1200, 5000);
+}
+
 // The first of all, and greedy's picks.
 std::vector<int> shortlist(const GreedyCover& greedy, std::size_t in_full) {
   std::vector<int> listed;
@@ -73,7 +78,7 @@ StationChoice choose_stations(const Views& views, std::size_t walls, const Cover
   const bool all = views.size() <= in_full;
   SetCover atoms = all ? wall_atoms(views, walls) : coarse_atoms(views, walls);
   atoms.goal = choice.goal_nm;
-  choice.at_least = stations_at_least(atoms, choice.greedy);
+  choice.at_least = stations_at_least(atoms, choice.greedy, bound_rounds(atoms));
   if (!refine) return choice;
   choice.cover =
       all ? refined_cover(views, walls, atoms, rules, choice.cover, choice.at_least, seed)
