@@ -384,8 +384,13 @@ TEST(PlanCover, RefinedTakesNoMoreStationsThanGreedyAndSaysHowFewCouldDo) {
     EXPECT_EQ(nm_to_m(problem.goal), refined.goal_m);
     EXPECT_EQ(problem.sets.size(), refined.candidates.size());
     fewer += stations < refined.stations_greedy;
+    // Spare stations are spent where that leaves no weak link.
+    if (stations == refined.stations_greedy) {
+      EXPECT_LE(refined.overlap.weak_links(), greedy.overlap.weak_links());
+      EXPECT_LE(refined.overlap.parts, greedy.overlap.parts);
+    }
   }
-  EXPECT_GE(fewer, 3);
+  EXPECT_GE(fewer, 2);
 }
 
 // What stopped the candidate that came furthest, asked point by point.

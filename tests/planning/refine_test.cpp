@@ -109,7 +109,7 @@ int optimum_by_the_rules(const Case& c) {
 TEST(RefinedCover, LiesBetweenTheOptimumAndGreedy) {
   Dice dice(3);
   int fewer = 0, optimal = 0, cases = 0;
-  for (int round = 0; round < 200; ++round) {
+  for (int round = 0; round < 80; ++round) {
     const Case c = random_case(dice, 8 + dice.below(6));
     if (c.greedy.picks.empty()) continue;
     const auto size = static_cast<int>(refined(c).picks.size());
@@ -121,7 +121,7 @@ TEST(RefinedCover, LiesBetweenTheOptimumAndGreedy) {
     optimal += size == best;
     ++cases;
   }
-  EXPECT_GT(fewer, 5);
+  EXPECT_GT(fewer, 2);
   EXPECT_GE(optimal, cases * 95 / 100);
 }
 
@@ -168,7 +168,7 @@ TEST(RefinedCover, HoldsTogetherNoWorseThanGreedyWithAsManyStations) {
 TEST(ChooseStations, KeepsItsPromisesBeyondTheCandidatesItTakesInFull) {
   Dice dice(7);
   int fewer = 0;
-  for (int round = 0; round < 60; ++round) {
+  for (int round = 0; round < 25; ++round) {
     const Case c = random_case(dice, 60);
     const int in_all = stations_at_least(c.atoms, static_cast<int>(c.greedy.picks.size()));
     for (const std::size_t in_full : {5u, 20u, 60u}) {
@@ -184,7 +184,7 @@ TEST(ChooseStations, KeepsItsPromisesBeyondTheCandidatesItTakesInFull) {
     EXPECT_EQ(choose_stations(c.v.views, c.v.walls, c.rules, false, 1, 5).cover.picks,
               c.greedy.picks);
   }
-  EXPECT_GT(fewer, 10);
+  EXPECT_GT(fewer, 5);
 }
 
 // Stations in a random yard, against the integer programme; without the rules, which it lacks.
