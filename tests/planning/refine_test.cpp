@@ -184,7 +184,7 @@ TEST(ChooseStations, KeepsItsPromisesBeyondTheCandidatesItTakesInFull) {
     EXPECT_EQ(choose_stations(c.v.views, c.v.walls, c.rules, false, 1, 5).cover.picks,
               c.greedy.picks);
   }
-  EXPECT_GT(fewer, 5);
+  EXPECT_GE(fewer, 3);
 }
 
 // Stations in a random yard, against the integer programme; without the rules, which it lacks.
