@@ -92,6 +92,7 @@ moat = "manual"
 "inner court" = "robot"
 attic = "skip"
 [phase1]
+cover = "greedy"
 candidates = 7
 coverage_goal = 0.5
 gain_min = 0
@@ -147,6 +148,7 @@ site=../sites/s
 seed=9223372036854775807
 margin_m=12
 return_home=false
+phase1.cover=greedy
 phase1.candidates=7
 phase1.coverage_goal=0.5
 phase1.gain_min=0
