@@ -88,15 +88,16 @@ std::vector<std::uint32_t> sweep(const VoxelMap& map, std::vector<BoundaryVoxel>
                    [](const BoundaryVoxel& a, const BoundaryVoxel& b) { return a.v.z < b.v.z; });
   const std::vector<Task> tasks = make_tasks(boundary, layers);
   const BlockedRows blocked(map);
-  std::vector<Sweep> sweeps(static_cast<std::size_t>(std::max(threads, 1)),
-                            Sweep(map.grid(), blocked, rule, tallies));
+  std::vector<Sweep<SeenCounts>> sweeps(
+      static_cast<std::size_t>(std::max(threads, 1)),
+      {map.grid(), blocked, rule, SeenCounts{std::vector<std::uint32_t>(tallies)}});
   for_pieces(threads, tasks.size(), 1, [&](int thread, std::size_t task, std::size_t) {
     for (std::size_t i = tasks[task].begin; i < tasks[task].end; ++i)
       sweeps[static_cast<std::size_t>(thread)].add(boundary[i], *tasks[task].layer);
   });
   std::vector<std::uint32_t> sum(tallies);
-  for (const Sweep& part : sweeps)
-    for (std::size_t i = 0; i < tallies; ++i) sum[i] += part.tallies()[i];
+  for (const Sweep<SeenCounts>& part : sweeps)
+    for (std::size_t i = 0; i < tallies; ++i) sum[i] += part.sink().tallies[i];
   return sum;
 }
 
@@ -213,20 +214,19 @@ std::vector<std::uint8_t> seen_by_any(const VoxelMap& map,
   const ViewRule rule(limits, map.grid().voxel_m);
   for (const BoundaryVoxel& u : boundary) check(map.grid(), u.v, "boundary voxel");
   const SortedCandidates sorted = sort_candidates(map, candidates);
-  const std::size_t tallies = sorted.layers.empty() ? 0 : sorted.layers.back().tally_end();
   const BlockedRows blocked(map);
-  std::vector<Sweep> sweeps(static_cast<std::size_t>(std::max(threads, 1)),
-                            Sweep(map.grid(), blocked, rule, tallies));
+  std::vector<Sweep<AnySeen>> sweeps(static_cast<std::size_t>(std::max(threads, 1)),
+                                     Sweep(map.grid(), blocked, rule, AnySeen{}));
   std::vector<std::uint8_t> seen(boundary.size());
   // Neighbours in the list share a layer: a thread seldom changes its paths.
   for_pieces(threads, boundary.size(), 128, [&](int thread, std::size_t begin, std::size_t end) {
-    Sweep& sweep = sweeps[static_cast<std::size_t>(thread)];
+    Sweep<AnySeen>& sweep = sweeps[static_cast<std::size_t>(thread)];
     for (const CandidateLayer& layer : sorted.layers)
       for (std::size_t i = begin; i < end; ++i) {
         if (seen[i] != 0) continue;
-        const std::uint64_t before = sweep.seen();
+        sweep.sink().any = false;
         sweep.add(boundary[i], layer);
-        seen[i] = sweep.seen() > before;
+        seen[i] = sweep.sink().any;
       }
     for (std::size_t i = begin; i < end; ++i)
       for (std::size_t k = 0; seen[i] == 0 && k < sorted.walked.size(); ++k)

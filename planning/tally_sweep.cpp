@@ -82,33 +82,37 @@ std::size_t CandidateLayer::tally_of(Voxel candidate) const {
   return row->tally_begin + static_cast<std::size_t>(candidate.x - row->x_first);
 }
 
-void Sweep::Live::measure() {
+template <class Sink>
+void Sweep<Sink>::Live::measure() {
   low = first + std::countr_zero(bits);
   high = first + 63 - std::countl_zero(bits);
 }
 
-void Sweep::Live::clear(int from, int to) {
-  bits &= ~span(first, from, to);
+template <class Sink>
+const LayerPaths& Sweep<Sink>::paths(int c) {
+  const auto known = std::find_if(paths_.rbegin(), paths_.rend(),
+                                  [&](const LayerPaths& paths) { return paths.c() == c; });
+  if (known != paths_.rend()) return *known;
+  if (paths_.size() == kPathsKept) paths_.erase(paths_.begin());
+  return paths_.emplace_back(rule_, c, grid_.ny - 1);
 }
 
-void Sweep::add(const BoundaryVoxel& u, const CandidateLayer& layer) {
+template <class Sink>
+void Sweep<Sink>::add(const BoundaryVoxel& u, const CandidateLayer& layer, RowRange rows) {
   const int c = layer.z() - u.v.z;
-  if (paths_.empty() || paths_.front().c() != std::abs(c)) {
-    paths_.clear();
-    paths_.emplace_back(rule_, std::abs(c), grid_.ny - 1);
-  }
-  const LayerPaths& paths = paths_.front();
   const bool z_face = c != 0 && (u.faces & (c > 0 ? kFaceZPlus : kFaceZMinus)) != 0;
   if (!z_face && (u.faces & ~(kFaceZPlus | kFaceZMinus)) == 0) return;
+  const LayerPaths& paths = this->paths(std::abs(c));
 
   Rays rays{};
   rays.u = u.v;
   rays.row_u = std::int64_t{u.v.z} * grid_.ny + u.v.y;
   rays.step_z = c < 0 ? -grid_.ny : grid_.ny;
-  const auto first =
-      std::lower_bound(layer.rows().begin(), layer.rows().end(), u.v.y - paths.rows() + 1,
-                       [](const CandidateLayer::Row& r, int y) { return r.y < y; });
-  for (auto row = first; row != layer.rows().end() && row->y - u.v.y < paths.rows(); ++row) {
+  rows.y_first = std::max(rows.y_first, u.v.y - paths.rows() + 1);
+  rows.y_last = std::min(rows.y_last, u.v.y + paths.rows() - 1);
+  const auto first = std::lower_bound(layer.rows().begin(), layer.rows().end(), rows.y_first,
+                                      [](const CandidateLayer::Row& r, int y) { return r.y < y; });
+  for (auto row = first; row != layer.rows().end() && row->y <= rows.y_last; ++row) {
     const int b = row->y - u.v.y;
     const RowLimits& limits = paths.limits(std::abs(b));
     int faced_last = z_face ? limits.z_face_last : -1;
@@ -129,9 +133,10 @@ void Sweep::add(const BoundaryVoxel& u, const CandidateLayer& layer) {
   }
 }
 
+template <class Sink>
 template <int kSide>
-void Sweep::add_side(const Rays& rays, const CandidateLayer& layer, const CandidateLayer::Row& row,
-                     const Admitted& admitted) {
+void Sweep<Sink>::add_side(const Rays& rays, const CandidateLayer& layer,
+                           const CandidateLayer::Row& row, const Admitted& admitted) {
   // In |a|, from the first to the last admitted candidate of the row; a = 0 is on the plus side.
   int first = INT32_MAX, last = -1;
   for (int i = 0; i < 2; ++i)
@@ -163,12 +168,12 @@ void Sweep::add_side(const Rays& rays, const CandidateLayer& layer, const Candid
       if (skip != 0) bits = candidates(first += skip);
       Live live{bits, first, 0, 0};
       cast<kSide>(rays, live);
-      seen_ += static_cast<std::uint64_t>(std::popcount(live.bits));
-      const std::size_t zero =
-          row.tally_begin + static_cast<std::size_t>(rays.u.x + kSide * first - row.x_first);
-      for (; live.bits != 0; live.bits &= live.bits - 1) {
-        const auto i = static_cast<std::size_t>(std::countr_zero(live.bits));
-        ++tallies_[kSide > 0 ? zero + i : zero - i];
+      if (live.bits != 0) {
+        if constexpr (kSide > 0) {
+          sink_.seen(layer, row, rays.u.x + first, live.bits);
+        } else {
+          sink_.seen(layer, row, rays.u.x - first - 63, reverse_bits(live.bits));
+        }
       }
     }
     first += 64;
@@ -176,8 +181,9 @@ void Sweep::add_side(const Rays& rays, const CandidateLayer& layer, const Candid
 }
 
 // Clears the candidates that something hides, from u outwards.
+template <class Sink>
 template <int kSide>
-void Sweep::cast(const Rays& rays, Live& live) const {
+void Sweep<Sink>::cast(const Rays& rays, Live& live) {
   live.measure();
   shade<kSide>(rays, 0, live);
   int level = 1;
@@ -207,23 +213,27 @@ void Sweep::cast(const Rays& rays, Live& live) const {
 
 // Bits of voxels first .. first + width - 1 from u, in the direction of a for the plus side and
 // reversed for the minus side.
+template <class Sink>
 template <int kSide>
-std::uint64_t Sweep::window(const Rays& rays, int level, std::int64_t row, int first,
-                            int width) const {
+std::uint64_t Sweep<Sink>::window(const Rays& rays, int level, std::int64_t row, int first,
+                                  int width) const {
   const int x = kSide > 0 ? rays.u.x + first : rays.u.x - first - width + 1;
   return blocked_.window(level, row, x, width);
 }
 
+template <class Sink>
 template <int kSide>
-bool Sweep::clear_window(const Rays& rays, int level, std::int64_t row, int first, int last) const {
+bool Sweep<Sink>::clear_window(const Rays& rays, int level, std::int64_t row, int first,
+                               int last) const {
   for (; last - first >= BlockedRows::kWindow; first += BlockedRows::kWindow)
     if (window<kSide>(rays, level, row, first, BlockedRows::kWindow) != 0) return false;
   return window<kSide>(rays, level, row, first, last - first + 1) == 0;
 }
 
 // Clears what the blocked voxels of one cell shadow. u itself does not block.
+template <class Sink>
 template <int kSide>
-void Sweep::shade(const Rays& rays, int cell, Live& live) const {
+void Sweep<Sink>::shade(const Rays& rays, int cell, Live& live) {
   const PathCell& c = rays.path.cells[cell];
   const PathTimes& times = rays.path.times[cell];
   const std::int64_t row = rays.row_u + c.j * rays.step_y + c.k * rays.step_z;
@@ -239,10 +249,43 @@ void Sweep::shade(const Rays& rays, int cell, Live& live) const {
       const int length = std::countr_one(blocked >> begin);
       blocked &= ~(ones(length) << begin);
       const int r0 = kSide > 0 ? first + begin : first + width - begin - length;
-      live.clear(times.shadow_first(r0), times.shadow_last(r0 + length - 1));
+      const std::uint64_t shadow =
+          span(live.first, times.shadow_first(r0), times.shadow_last(r0 + length - 1));
+      if ((live.bits & shadow) == 0) continue;
+      live.bits &= ~shadow;
+      sink_.hidden(row, kSide > 0 ? rays.u.x + r0 : rays.u.x - r0 - length + 1, length);
     }
   }
   if (live.bits != 0) live.measure();
 }
+
+void SeenCounts::seen(const CandidateLayer&, const CandidateLayer::Row& row, int x,
+                      std::uint64_t bits) {
+  // May begin before the row: only the sums are indices.
+  const std::int64_t zero = static_cast<std::int64_t>(row.tally_begin) + x - row.x_first;
+  for (; bits != 0; bits &= bits - 1)
+    ++tallies[static_cast<std::size_t>(zero + std::countr_zero(bits))];
+}
+
+void SeenSet::seen(const CandidateLayer&, const CandidateLayer::Row& row, int x,
+                   std::uint64_t bits) {
+  // x may be negative, but no bit is set there.
+  const int shift = x & 63;
+  const std::int64_t word = row.y * row_words + (x >> 6);
+  if (const std::uint64_t low = bits << shift; low != 0)
+    words.push_back({static_cast<std::uint32_t>(word), low});
+  if (const std::uint64_t high = shift == 0 ? 0 : bits >> (64 - shift); high != 0)
+    words.push_back({static_cast<std::uint32_t>(word + 1), high});
+}
+
+void SeenSet::hidden(std::int64_t row, int x, int width) {
+  const std::int64_t bytes = row * row_words * 8;
+  for (int byte = x >> 3; byte <= (x + width - 1) >> 3; ++byte)
+    hidden_by.push_back(static_cast<std::uint32_t>(bytes + byte));
+}
+
+template class Sweep<SeenCounts>;
+template class Sweep<SeenSet>;
+template class Sweep<AnySeen>;
 
 }  // namespace planning

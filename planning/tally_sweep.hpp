@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <cstring>
+#include <utility>
 #include <vector>
 
 #include "planning/next_best_view.hpp"
@@ -66,16 +67,27 @@ class CandidateLayer {
   std::size_t tally_end_;
 };
 
-// One thread's sweep. Adds to its own tallies.
+// Rows of voxels, inclusive.
+struct RowRange {
+  int y_first{0}, y_last{INT32_MAX};
+};
+
+// One thread's sweep. What it finds goes to a sink with
+//     void seen(const CandidateLayer&, const CandidateLayer::Row&, int x, std::uint64_t bits)
+// bit i: the candidate at x + i sees the boundary voxel; each candidate comes at most once;
+//     void hidden(std::int64_t row, int x, int width)
+// blocked voxels x .. x + width - 1 of a row of BlockedRows hide a candidate. As long as all that
+// were named stay blocked, no other candidate comes to see the boundary voxel.
+template <class Sink>
 class Sweep {
  public:
-  Sweep(const VoxelGrid& grid, const BlockedRows& blocked, const ViewRule& rule,
-        std::size_t tallies)
-      : grid_(grid), blocked_(blocked), rule_(rule), tallies_(tallies) {}
+  // Refers to grid and blocked.
+  Sweep(const VoxelGrid& grid, const BlockedRows& blocked, const ViewRule& rule, Sink sink)
+      : grid_(grid), blocked_(blocked), rule_(rule), sink_(std::move(sink)) {}
 
-  void add(const BoundaryVoxel& u, const CandidateLayer& layer);
-  const std::vector<std::uint32_t>& tallies() const { return tallies_; }
-  std::uint64_t seen() const { return seen_; }  // The sum of all tallies.
+  void add(const BoundaryVoxel& u, const CandidateLayer& layer, RowRange rows = {});
+  Sink& sink() { return sink_; }
+  const Sink& sink() const { return sink_; }
 
  private:
   // The candidates a = side |a| whose |a| is in one of two spans (inclusive).
@@ -95,16 +107,16 @@ class Sweep {
     int first;
     int low, high;  // The smallest and the largest |a|; meaningless when bits is 0.
     void measure();
-    void clear(int from, int to);
   };
 
+  const LayerPaths& paths(int c);
   template <int kSide>
   void add_side(const Rays& rays, const CandidateLayer& layer, const CandidateLayer::Row& row,
                 const Admitted& admitted);
   template <int kSide>
-  void cast(const Rays& rays, Live& live) const;
+  void cast(const Rays& rays, Live& live);
   template <int kSide>
-  void shade(const Rays& rays, int cell, Live& live) const;
+  void shade(const Rays& rays, int cell, Live& live);
   template <int kSide>
   std::uint64_t window(const Rays& rays, int level, std::int64_t row, int first, int width) const;
   template <int kSide>
@@ -113,9 +125,45 @@ class Sweep {
   const VoxelGrid& grid_;
   const BlockedRows& blocked_;
   ViewRule rule_;
-  std::vector<LayerPaths> paths_;  // At most one: of the |c| last asked for.
-  std::vector<std::uint32_t> tallies_;
-  std::uint64_t seen_{};
+  static constexpr std::size_t kPathsKept = 4;
+  std::vector<LayerPaths> paths_;  // Of the last few |c| asked for, the latest at the end.
+  Sink sink_;
 };
+
+// Sink: how many boundary voxels each candidate sees.
+struct SeenCounts {
+  std::vector<std::uint32_t> tallies;
+
+  void seen(const CandidateLayer&, const CandidateLayer::Row& row, int x, std::uint64_t bits);
+  void hidden(std::int64_t, int, int) {}
+};
+
+// 64 candidates of a row of voxels, from an x that is a multiple of 64.
+struct SeenWord {
+  std::uint32_t word{};  // Index among the words of all voxels of the layer.
+  std::uint64_t bits{};
+};
+
+// Sink: which candidates of a layer see a boundary voxel, and what hides the others.
+struct SeenSet {
+  std::int64_t row_words{};              // Of the map.
+  std::vector<SeenWord> words;           // In no order, a word may be repeated.
+  std::vector<std::uint32_t> hidden_by;  // Bytes of BlockedRows; in no order, repeated.
+
+  void seen(const CandidateLayer&, const CandidateLayer::Row& row, int x, std::uint64_t bits);
+  void hidden(std::int64_t row, int x, int width);
+};
+
+// Sink: whether any candidate sees a boundary voxel.
+struct AnySeen {
+  bool any{};
+
+  void seen(const CandidateLayer&, const CandidateLayer::Row&, int, std::uint64_t) { any = true; }
+  void hidden(std::int64_t, int, int) {}
+};
+
+extern template class Sweep<SeenCounts>;
+extern template class Sweep<SeenSet>;
+extern template class Sweep<AnySeen>;
 
 }  // namespace planning
