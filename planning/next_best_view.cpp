@@ -19,13 +19,6 @@ std::int64_t square(std::int64_t n) {
   return n * n;
 }
 
-void check(const VoxelGrid& grid, Voxel v, const char* what) {
-  if (!grid.contains(v))
-    throw std::invalid_argument(std::string(what) + " (" + std::to_string(v.x) + ", " +
-                                std::to_string(v.y) + ", " + std::to_string(v.z) +
-                                ") is outside the voxel box");
-}
-
 // Candidates without repetition, by layer, and which are not seen-empty (their own voxel has to be
 // let through: they are walked one by one).
 struct SortedCandidates {
@@ -38,7 +31,7 @@ bool by_layer(const Voxel& a, const Voxel& b) {
 }
 
 SortedCandidates sort_candidates(const VoxelMap& map, std::vector<Voxel> candidates) {
-  for (const Voxel p : candidates) check(map.grid(), p, "candidate");
+  for (const Voxel p : candidates) require_inside(map.grid(), p, "candidate");
   std::sort(candidates.begin(), candidates.end(), by_layer);
   candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
   SortedCandidates sorted;
@@ -181,7 +174,7 @@ std::vector<std::uint32_t> tally(const VoxelMap& map, const std::vector<Boundary
                                  const std::vector<Voxel>& candidates, const ViewLimits& limits,
                                  int threads) {
   const ViewRule rule(limits, map.grid().voxel_m);
-  for (const BoundaryVoxel& u : boundary) check(map.grid(), u.v, "boundary voxel");
+  for (const BoundaryVoxel& u : boundary) require_inside(map.grid(), u.v, "boundary voxel");
   const SortedCandidates sorted = sort_candidates(map, candidates);
   const std::vector<std::uint32_t> swept = sweep(map, boundary, sorted.layers, rule, threads);
 
@@ -239,7 +232,7 @@ std::vector<std::uint8_t> seen_by_any(const VoxelMap& map,
 std::vector<std::uint32_t> visible_from(const VoxelMap& map,
                                         const std::vector<BoundaryVoxel>& boundary, Voxel p,
                                         const ViewLimits& limits) {
-  check(map.grid(), p, "viewpoint");
+  require_inside(map.grid(), p, "viewpoint");
   const ViewRule rule(limits, map.grid().voxel_m);
   std::vector<std::uint32_t> result;
   for (std::size_t i = 0; i < boundary.size(); ++i)

@@ -1,6 +1,9 @@
 #include "planning/tally_paths.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <optional>
 
 namespace planning {
 namespace {
@@ -46,7 +49,67 @@ RowLimits limits_of(const ViewRule& rule, std::int64_t b, std::int64_t c) {
   return limits;
 }
 
+// When the path to row (b, c) is in cell (j, k), all >= 0; nothing if it passes it by.
+std::optional<PathTimes> times_in_cell(int b, int c, int j, int k) {
+  if (j > b || k > c) return std::nullopt;
+  PathTimes times;
+  times.out_num = 2;
+  const auto enter = [&](int num, int den) {
+    if (std::int64_t{num} * times.in_den > std::int64_t{times.in_num} * den)
+      times.in_num = num, times.in_den = den;
+  };
+  const auto leave = [&](int num, int den) {
+    if (std::int64_t{num} * times.out_den < std::int64_t{times.out_num} * den)
+      times.out_num = num, times.out_den = den;
+  };
+  if (j > 0) enter(2 * j - 1, b);
+  if (k > 0) enter(2 * k - 1, c);
+  if (j < b) leave(2 * j + 1, b);
+  if (k < c) leave(2 * k + 1, c);
+  if (std::int64_t{times.in_num} * times.out_den >= std::int64_t{times.out_num} * times.in_den)
+    return std::nullopt;
+  return times;
+}
+
 }  // namespace
+
+Interval rows_behind(Voxel u, Voxel v, int z) {
+  const Interval none{0, -1};
+  const std::int64_t side = z < u.z ? -1 : 1;
+  const std::int64_t c = std::abs(z - u.z), k = side * (v.z - u.z), j = std::abs(v.y - u.y);
+  if (k < 0 || k > c) return none;
+  // b (2 k + 1) > c (2 j - 1) and b (2 k - 1) < c (2 j + 1), or the ray is above or below v.
+  std::int64_t low = j, high = INT32_MAX / 2;
+  if (k < c && j > 0) low = std::max(low, c * (2 * j - 1) / (2 * k + 1));
+  if (k > 0) high = c * (2 * j + 1) / (2 * k - 1);
+  if (low > high) return none;
+  const int near = static_cast<int>(low), far = static_cast<int>(high);
+  if (v.y > u.y) return {u.y + near, u.y + far};
+  if (v.y < u.y) return {u.y - far, u.y - near};
+  return {u.y - far, u.y + far};
+}
+
+Interval crossing(int from, Interval to, int c, int k) {
+  const double in = k == 0 ? 0 : (k - 0.5) / c, out = k == c ? 1 : (k + 0.5) / c;
+  const double low = to.first - from, high = to.last - from;
+  constexpr double kRounding = 1e-6;
+  return {from + static_cast<int>(std::floor(std::min(low * in, low * out) + 0.5 - kRounding)),
+          from + static_cast<int>(std::ceil(std::max(high * in, high * out) - 0.5 + kRounding))};
+}
+
+std::uint64_t shadow_of(Voxel u, Voxel v, Voxel p) {
+  const bool back = (p.y < u.y && v.y > u.y) || (p.y > u.y && v.y < u.y) ||
+                    (p.z < u.z && v.z > u.z) || (p.z > u.z && v.z < u.z);
+  const auto times = times_in_cell(std::abs(p.y - u.y), std::abs(p.z - u.z), std::abs(v.y - u.y),
+                                   std::abs(v.z - u.z));
+  if (back || !times) return 0;
+  const int r = std::abs(v.x - u.x);
+  const int first = times->shadow_first(r), last = std::min(times->shadow_last(r), 1 << 20);
+  std::uint64_t bits = 0;
+  if (v.x >= u.x) bits |= bits_within(p.x, u.x + first, u.x + last);
+  if (v.x <= u.x) bits |= bits_within(p.x, u.x - last, u.x - first);
+  return bits;
+}
 
 LayerPaths::LayerPaths(const ViewRule& rule, int c, int b_max) : c_(c) {
   begin_.push_back(0);

@@ -9,12 +9,30 @@
 // through an inner face enters the next.)
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
 #include "planning/next_best_view.hpp"
 
 namespace planning {
+
+// Integers, both inclusive; none if first > last.
+struct Interval {
+  int first{0}, last{INT32_MAX};
+
+  bool empty() const { return first > last; }
+};
+
+inline std::uint64_t ones(int count) {
+  return count >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << count) - 1;
+}
+
+// Bits i with first <= base + i <= last.
+inline std::uint64_t bits_within(int base, int first, int last) {
+  const int low = std::max(first - base, 0), high = std::min(last - base, 63);
+  return low > high ? 0 : ones(high - low + 1) << low;
+}
 
 // Which of the candidates of a row at (b, c) voxels (|b|, |c| suffice) are in range and see a face;
 // all in |a|.
@@ -72,5 +90,15 @@ class LayerPaths {
   std::vector<PathCell> cells_;
   std::vector<PathTimes> times_;
 };
+
+// The rows of layer z in which v may hide candidates from u, maybe some more.
+Interval rows_behind(Voxel u, Voxel v, int z);
+
+// Where, along one axis, rays from `from` to candidates within `to` may be while they cross the
+// voxels k levels from u on the way to level c, 0 <= k <= c; maybe one voxel more.
+Interval crossing(int from, Interval to, int c, int k);
+
+// Exactly whom v hides from u among the 64 candidates from p along x, p's x upwards. v is not u.
+std::uint64_t shadow_of(Voxel u, Voxel v, Voxel p);
 
 }  // namespace planning

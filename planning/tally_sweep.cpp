@@ -3,21 +3,13 @@
 #include <algorithm>
 #include <bit>
 #include <cstdlib>
+#include <stdexcept>
+#include <string>
 
 namespace planning {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "windows are loaded as bytes");
-
-std::uint64_t ones(int count) {
-  return count >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << count) - 1;
-}
-
-// Bits i with first <= base + i <= last.
-std::uint64_t span(int base, int first, int last) {
-  const int low = std::max(first - base, 0), high = std::min(last - base, 63);
-  return low > high ? 0 : ones(high - low + 1) << low;
-}
 
 std::uint64_t reverse_bits(std::uint64_t bits) {
   const auto swap = [&](unsigned shift, std::uint64_t mask) {
@@ -30,6 +22,13 @@ std::uint64_t reverse_bits(std::uint64_t bits) {
 }
 
 }  // namespace
+
+void require_inside(const VoxelGrid& grid, Voxel v, const char* what) {
+  if (!grid.contains(v))
+    throw std::invalid_argument(std::string(what) + " (" + std::to_string(v.x) + ", " +
+                                std::to_string(v.y) + ", " + std::to_string(v.z) +
+                                ") is outside the voxel box");
+}
 
 BlockedRows::BlockedRows(const VoxelMap& map) {
   const VoxelGrid& grid = map.grid();
@@ -98,7 +97,7 @@ const LayerPaths& Sweep<Sink>::paths(int c) {
 }
 
 template <class Sink>
-void Sweep<Sink>::add(const BoundaryVoxel& u, const CandidateLayer& layer, RowRange rows) {
+void Sweep<Sink>::add(const BoundaryVoxel& u, const CandidateLayer& layer, Interval rows) {
   const int c = layer.z() - u.v.z;
   const bool z_face = c != 0 && (u.faces & (c > 0 ? kFaceZPlus : kFaceZMinus)) != 0;
   if (!z_face && (u.faces & ~(kFaceZPlus | kFaceZMinus)) == 0) return;
@@ -108,11 +107,11 @@ void Sweep<Sink>::add(const BoundaryVoxel& u, const CandidateLayer& layer, RowRa
   rays.u = u.v;
   rays.row_u = std::int64_t{u.v.z} * grid_.ny + u.v.y;
   rays.step_z = c < 0 ? -grid_.ny : grid_.ny;
-  rows.y_first = std::max(rows.y_first, u.v.y - paths.rows() + 1);
-  rows.y_last = std::min(rows.y_last, u.v.y + paths.rows() - 1);
-  const auto first = std::lower_bound(layer.rows().begin(), layer.rows().end(), rows.y_first,
+  rows.first = std::max(rows.first, u.v.y - paths.rows() + 1);
+  rows.last = std::min(rows.last, u.v.y + paths.rows() - 1);
+  const auto first = std::lower_bound(layer.rows().begin(), layer.rows().end(), rows.first,
                                       [](const CandidateLayer::Row& r, int y) { return r.y < y; });
-  for (auto row = first; row != layer.rows().end() && row->y <= rows.y_last; ++row) {
+  for (auto row = first; row != layer.rows().end() && row->y <= rows.last; ++row) {
     const int b = row->y - u.v.y;
     const RowLimits& limits = paths.limits(std::abs(b));
     int faced_last = z_face ? limits.z_face_last : -1;
@@ -157,9 +156,9 @@ void Sweep<Sink>::add_side(const Rays& rays, const CandidateLayer& layer,
       bits = reverse_bits(layer.bits(row, rays.u.x - a - 63));
     }
     return bits &
-           (span(a, admitted.first[0], admitted.last[0]) |
-            span(a, admitted.first[1], admitted.last[1])) &
-           span(a, first, last);
+           (bits_within(a, admitted.first[0], admitted.last[0]) |
+            bits_within(a, admitted.first[1], admitted.last[1])) &
+           bits_within(a, first, last);
   };
   while (first <= last) {
     std::uint64_t bits = candidates(first);
@@ -250,7 +249,7 @@ void Sweep<Sink>::shade(const Rays& rays, int cell, Live& live) {
       blocked &= ~(ones(length) << begin);
       const int r0 = kSide > 0 ? first + begin : first + width - begin - length;
       const std::uint64_t shadow =
-          span(live.first, times.shadow_first(r0), times.shadow_last(r0 + length - 1));
+          bits_within(live.first, times.shadow_first(r0), times.shadow_last(r0 + length - 1));
       if ((live.bits & shadow) == 0) continue;
       live.bits &= ~shadow;
       sink_.hidden(row, kSide > 0 ? rays.u.x + r0 : rays.u.x - r0 - length + 1, length);
@@ -271,7 +270,7 @@ void SeenSet::seen(const CandidateLayer&, const CandidateLayer::Row& row, int x,
                    std::uint64_t bits) {
   // x may be negative, but no bit is set there.
   const int shift = x & 63;
-  const std::int64_t word = row.y * row_words + (x >> 6);
+  const std::int64_t word = word_begin + row.y * row_words_ + (x >> 6);
   if (const std::uint64_t low = bits << shift; low != 0)
     words.push_back({static_cast<std::uint32_t>(word), low});
   if (const std::uint64_t high = shift == 0 ? 0 : bits >> (64 - shift); high != 0)
@@ -279,9 +278,23 @@ void SeenSet::seen(const CandidateLayer&, const CandidateLayer::Row& row, int x,
 }
 
 void SeenSet::hidden(std::int64_t row, int x, int width) {
-  const std::int64_t bytes = row * row_words * 8;
+  const std::int64_t bytes = row * row_words_ * 8;
   for (int byte = x >> 3; byte <= (x + width - 1) >> 3; ++byte)
-    hidden_by.push_back(static_cast<std::uint32_t>(bytes + byte));
+    name(static_cast<std::uint32_t>(bytes + byte));
+}
+
+void SeenSet::name(std::uint32_t byte) {
+  const std::uint64_t bit = std::uint64_t{1} << (byte & 63);
+  if ((named_[byte >> 6] & bit) != 0) return;
+  named_[byte >> 6] |= bit;
+  hidden_by.push_back(byte);
+}
+
+void SeenSet::restart(const std::vector<std::uint32_t>& known_to_hide) {
+  words.clear();
+  for (const std::uint32_t byte : hidden_by) named_[byte >> 6] = 0;
+  hidden_by.clear();
+  for (const std::uint32_t byte : known_to_hide) name(byte);
 }
 
 template class Sweep<SeenCounts>;

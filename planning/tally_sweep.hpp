@@ -11,6 +11,9 @@
 
 namespace planning {
 
+// Throws std::invalid_argument that names what.
+void require_inside(const VoxelGrid& grid, Voxel v, const char* what);
+
 // What blocks the view (not seen-empty), one bit per voxel, and the same with 2, 4, 8 and 16 rows
 // or-ed together: row y of level l is blocked where any of rows y .. y + 2^l - 1 is.
 class BlockedRows {
@@ -67,11 +70,6 @@ class CandidateLayer {
   std::size_t tally_end_;
 };
 
-// Rows of voxels, inclusive.
-struct RowRange {
-  int y_first{0}, y_last{INT32_MAX};
-};
-
 // One thread's sweep. What it finds goes to a sink with
 //     void seen(const CandidateLayer&, const CandidateLayer::Row&, int x, std::uint64_t bits)
 // bit i: the candidate at x + i sees the boundary voxel; each candidate comes at most once;
@@ -85,7 +83,7 @@ class Sweep {
   Sweep(const VoxelGrid& grid, const BlockedRows& blocked, const ViewRule& rule, Sink sink)
       : grid_(grid), blocked_(blocked), rule_(rule), sink_(std::move(sink)) {}
 
-  void add(const BoundaryVoxel& u, const CandidateLayer& layer, RowRange rows = {});
+  void add(const BoundaryVoxel& u, const CandidateLayer& layer, Interval rows = {});
   Sink& sink() { return sink_; }
   const Sink& sink() const { return sink_; }
 
@@ -144,14 +142,28 @@ struct SeenWord {
   std::uint64_t bits{};
 };
 
-// Sink: which candidates of a layer see a boundary voxel, and what hides the others.
-struct SeenSet {
-  std::int64_t row_words{};              // Of the map.
+// Sink: which candidates see a boundary voxel, and what hides the others.
+class SeenSet {
+ public:
+  // For rows of row_words words, `rows` of them in the map.
+  SeenSet(std::int64_t row_words, std::size_t rows)
+      : row_words_(row_words), named_((static_cast<std::size_t>(row_words) * rows + 7) / 8) {}
+
+  // Of the layer that is swept next: the word of its row 0.
+  std::int64_t word_begin{};
   std::vector<SeenWord> words;           // In no order, a word may be repeated.
-  std::vector<std::uint32_t> hidden_by;  // Bytes of BlockedRows; in no order, repeated.
+  std::vector<std::uint32_t> hidden_by;  // Bytes of BlockedRows, each once, in no order.
 
   void seen(const CandidateLayer&, const CandidateLayer::Row& row, int x, std::uint64_t bits);
   void hidden(std::int64_t row, int x, int width);
+  // Empties both lists, or begins with those that are known to hide something.
+  void restart(const std::vector<std::uint32_t>& known_to_hide);
+
+ private:
+  void name(std::uint32_t byte);
+
+  std::int64_t row_words_;
+  std::vector<std::uint64_t> named_;  // A bit per byte: whether it is in hidden_by.
 };
 
 // Sink: whether any candidate sees a boundary voxel.
