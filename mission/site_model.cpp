@@ -83,7 +83,8 @@ SiteModel::SiteModel(const MissionConfig& config, const nav::SiteMap& map,
       threads_(threads),
       map_(voxel_grid(config, map, tasks_),
            layers_kept(config, voxel_grid(config, map, tasks_), tasks_)),
-      density_(config.robot.scanner, config.phase2.density_min_ppm2, threads) {
+      density_(config.robot.scanner, config.phase2.density_min_ppm2, threads),
+      tally_(view_limits(config.robot.scanner), threads) {
   if (config_.phase2.foliage) beams_.emplace(map_);
   find_cells();
   const planning::VoxelGrid& grid = map_.grid();
@@ -264,13 +265,13 @@ std::vector<planning::Voxel> voxels_of(const std::vector<CellTally>& tallies) {
 
 }  // namespace
 
-std::vector<CellTally> SiteModel::tally() const {
+std::vector<CellTally> SiteModel::tally() {
   std::vector<CellTally> open;
   for (std::size_t i = 0; i < cells_.size(); ++i)
     if (!excluded_[i] && planner_map().at(cells_[i].voxel) == planning::VoxelState::seen_empty)
       open.push_back({cells_[i], 0});
-  const std::vector<std::uint32_t> counts = planning::tally(
-      planner_map(), worth_seeing(), voxels_of(open), view_limits(config_.robot.scanner), threads_);
+  const std::vector<std::uint32_t>& counts =
+      tally_.update(planner_map(), worth_seeing(), voxels_of(open));
   for (std::size_t i = 0; i < open.size(); ++i) open[i].voxels = counts[i];
   return open;
 }

@@ -13,6 +13,7 @@
 #include "mission/record.hpp"
 #include "nav/raster.hpp"
 #include "planning/next_views.hpp"
+#include "planning/running_tally.hpp"
 #include "planning/voxel_foliage.hpp"
 #include "planning/voxel_map.hpp"
 
@@ -71,7 +72,7 @@ class SiteModel {
                  const Eigen::Isometry3d& T_W_S, double ground_z_m);
 
   // Every cell that a view may be asked for, and how many boundary unseen voxels it counts.
-  std::vector<CellTally> tally() const;
+  std::vector<CellTally> tally();
 
   // Candidates by gain, best first, ties to the lowest index; those below the threshold are left
   // out. Empty: no view would add enough. best_voxels() tells the maximum all the same.
@@ -131,6 +132,7 @@ class SiteModel {
   const std::vector<AreaTask> tasks_;
   const int threads_;
   planning::VoxelMap map_;
+  planning::RunningTally tally_;
   std::vector<planning::BoundaryVoxel> boundary_;  // Within the site's boundary only.
   std::vector<std::uint8_t> in_site_;              // Per column of voxels.
   std::vector<planning::Voxel> ground_;            // Hold the mapped ground; never seen-empty.

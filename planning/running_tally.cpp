@@ -109,7 +109,7 @@ std::vector<std::uint32_t> RunningTally::visible(Voxel p) const {
     if (sight.words.empty() || !rule_->admits(sight.u, p)) continue;
     const auto word =
         std::lower_bound(sight.words.begin(), sight.words.end(), wanted,
-                         [](const SeenWord& w, std::uint32_t i) { return w.word < i; });
+                         [](const SeenWord& w, std::uint32_t k) { return w.word < k; });
     if (word != sight.words.end() && word->word == wanted && (word->bits >> (p.x & 63) & 1) != 0)
       result.push_back(order_[i]);
   }
@@ -294,7 +294,8 @@ void RunningTally::uncover(Sight& sight, const Changes& changes,
     const int row = static_cast<int>(byte / static_cast<std::uint32_t>(row_bytes));
     const Voxel v{0, row % grid.ny, row / grid.ny};
     for (std::size_t i = 0; i < layers_.size(); ++i) {
-      const Interval behind = rows_behind(sight.u.v, v, layers_[i].z);
+      Interval behind = rows_behind(sight.u.v, v, layers_[i].z);
+      behind = {std::max(behind.first, 0), std::min(behind.last, grid.ny - 1)};
       if (behind.empty()) continue;
       rows[i] = rows[i].empty() ? behind
                                 : Interval{std::min(rows[i].first, behind.first),
