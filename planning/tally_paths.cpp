@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <optional>
 
 namespace planning {
 namespace {
@@ -49,28 +48,6 @@ RowLimits limits_of(const ViewRule& rule, std::int64_t b, std::int64_t c) {
   return limits;
 }
 
-// When the path to row (b, c) is in cell (j, k), all >= 0; nothing if it passes it by.
-std::optional<PathTimes> times_in_cell(int b, int c, int j, int k) {
-  if (j > b || k > c) return std::nullopt;
-  PathTimes times;
-  times.out_num = 2;
-  const auto enter = [&](int num, int den) {
-    if (std::int64_t{num} * times.in_den > std::int64_t{times.in_num} * den)
-      times.in_num = num, times.in_den = den;
-  };
-  const auto leave = [&](int num, int den) {
-    if (std::int64_t{num} * times.out_den < std::int64_t{times.out_num} * den)
-      times.out_num = num, times.out_den = den;
-  };
-  if (j > 0) enter(2 * j - 1, b);
-  if (k > 0) enter(2 * k - 1, c);
-  if (j < b) leave(2 * j + 1, b);
-  if (k < c) leave(2 * k + 1, c);
-  if (std::int64_t{times.in_num} * times.out_den >= std::int64_t{times.out_num} * times.in_den)
-    return std::nullopt;
-  return times;
-}
-
 }  // namespace
 
 Interval rows_behind(Voxel u, Voxel v, int z) {
@@ -102,8 +79,8 @@ std::uint64_t shadow_of(Voxel u, Voxel v, Voxel p) {
                     (p.z < u.z && v.z > u.z) || (p.z > u.z && v.z < u.z);
   const auto times = times_in_cell(std::abs(p.y - u.y), std::abs(p.z - u.z), std::abs(v.y - u.y),
                                    std::abs(v.z - u.z));
-  if (back || !times) return 0;
   const int r = std::abs(v.x - u.x);
+  if (back || !times || r > PathTimes::kRunMax) return 0;
   const int first = times->shadow_first(r), last = std::min(times->shadow_last(r), 1 << 20);
   std::uint64_t bits = 0;
   if (v.x >= u.x) bits |= bits_within(p.x, u.x + first, u.x + last);
@@ -145,10 +122,11 @@ void LayerPaths::add_path(int b) {
     j += step_y;
     k += step_z;
   }
-  for (std::size_t i = cells_.size(); i-- > first;) {
-    const bool goes_on = i + 1 < cells_.size() && cells_[i + 1].k == cells_[i].k;
-    cells_[i].run = static_cast<std::uint16_t>(goes_on ? cells_[i + 1].run + 1 : 1);
-  }
+  for (int m = 0; m < 3; ++m)
+    for (std::size_t i = first, end = first; i < cells_.size(); ++i) {
+      while (end < cells_.size() && cells_[end].k < cells_[i].k + (1 << m)) ++end;
+      cells_[i].within[m] = static_cast<std::uint16_t>(end - i);
+    }
   begin_.push_back(cells_.size());
 }
 

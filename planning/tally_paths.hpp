@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "planning/next_best_view.hpp"
@@ -46,21 +47,43 @@ struct RowLimits {
 struct PathCell {
   std::uint32_t in{}, out{};  // Times in 1/65536; `in` rounded down, `out` up.
   std::int16_t j{}, k{};      // Steps along y and z since u.
-  std::uint16_t run{};        // Cells from here on, this included, that differ by steps in y only.
+  // Cells from here on, this included, within the next 1, 2 and 4 levels of z (k, k+1, ...).
+  std::uint16_t within[3]{};
 };
 // Its times exactly: num / (2 den).
 struct PathTimes {
   std::int32_t in_num{}, in_den{1}, out_num{}, out_den{1};
 
-  // The candidates that blocked voxels [r0, r1], 0 <= r1, shadow: |a| in [first, last].
-  int shadow_first(int r0) const {
-    return r0 <= 0 ? 0 : static_cast<int>((2 * std::int64_t{r0} - 1) * out_den / out_num) + 1;
-  }
+  // The candidates that blocked voxels [r0, r1], 0 <= r1, shadow: |a| in [first, last]. Nothing is
+  // in view beyond 16000 voxels (ViewRule), so 32 bits do for r up to kRunMax.
+  static constexpr int kRunMax = 32000;
+  int shadow_first(int r0) const { return r0 <= 0 ? 0 : (2 * r0 - 1) * out_den / out_num + 1; }
   int shadow_last(int r1) const {
-    return in_num == 0 ? INT32_MAX
-                       : static_cast<int>(((2 * std::int64_t{r1} + 1) * in_den - 1) / in_num);
+    return in_num == 0 ? INT32_MAX : ((2 * r1 + 1) * in_den - 1) / in_num;
   }
 };
+
+// When the path to row (b, c) is in cell (j, k), all >= 0; nothing if it passes it by.
+inline std::optional<PathTimes> times_in_cell(int b, int c, int j, int k) {
+  if (j > b || k > c) return std::nullopt;
+  PathTimes times;
+  times.out_num = 2;
+  const auto enter = [&](int num, int den) {
+    if (std::int64_t{num} * times.in_den > std::int64_t{times.in_num} * den)
+      times.in_num = num, times.in_den = den;
+  };
+  const auto leave = [&](int num, int den) {
+    if (std::int64_t{num} * times.out_den < std::int64_t{times.out_num} * den)
+      times.out_num = num, times.out_den = den;
+  };
+  if (j > 0) enter(2 * j - 1, b);
+  if (k > 0) enter(2 * k - 1, c);
+  if (j < b) leave(2 * j + 1, b);
+  if (k < c) leave(2 * k + 1, c);
+  if (std::int64_t{times.in_num} * times.out_den >= std::int64_t{times.out_num} * times.in_den)
+    return std::nullopt;
+  return times;
+}
 
 // Paths and limits of all rows in one layer of candidates, |c| voxels above or below u.
 class LayerPaths {

@@ -33,29 +33,25 @@ void require_inside(const VoxelGrid& grid, Voxel v, const char* what) {
 BlockedRows::BlockedRows(const VoxelMap& map) {
   const VoxelGrid& grid = map.grid();
   const auto row_words = static_cast<std::size_t>(map.row_words());
+  const auto level_words = row_words * static_cast<std::size_t>(grid.ny);
   row_bytes_ = static_cast<std::int64_t>(row_words * sizeof(std::uint64_t));
-  const std::size_t words =
-      row_words * static_cast<std::size_t>(grid.ny) * static_cast<std::size_t>(grid.nz);
-  for (auto& level : words_) level.reserve(words + 1);
+  for (auto& words : words_) words.reserve(level_words * static_cast<std::size_t>(grid.nz) + 1);
   for (int z = 0; z < grid.nz; ++z)
     for (int y = 0; y < grid.ny; ++y)
       for (const std::uint64_t empty : map.empty_row(y, z)) words_[0].push_back(~empty);
-  for (int level = 1; level < kLevels; ++level) {
-    const int distance = 1 << (level - 1);
-    words_[level] = words_[level - 1];
-    for (int z = 0; z < grid.nz; ++z)
-      for (int y = 0; y + distance < grid.ny; ++y) {
-        const std::size_t row = (static_cast<std::size_t>(z) * static_cast<std::size_t>(grid.ny) +
-                                 static_cast<std::size_t>(y)) *
-                                row_words;
-        const std::size_t other = row + static_cast<std::size_t>(distance) * row_words;
-        for (std::size_t i = 0; i < row_words; ++i)
-          words_[level][row + i] |= words_[level - 1][other + i];
-      }
+  // Each block is two of half its size. Levels follow one another, so rows of the next level come
+  // in beyond the last row: such blocks are never asked for.
+  for (int block = 1; block < kYSizes * kZSizes; ++block) {
+    const int l = block % kYSizes, m = block / kYSizes;
+    const auto& half = words_[l > 0 ? block - 1 : block - kYSizes];
+    const std::size_t distance = l > 0 ? row_words << (l - 1) : level_words << (m - 1);
+    auto& words = words_[block];
+    words = half;
+    for (std::size_t i = 0; i + distance < words.size(); ++i) words[i] |= half[i + distance];
   }
-  for (int level = 0; level < kLevels; ++level) {
-    words_[level].push_back(0);  // A window may be loaded past the last word.
-    bytes_[level] = reinterpret_cast<const unsigned char*>(words_[level].data());
+  for (int block = 0; block < kYSizes * kZSizes; ++block) {
+    words_[block].push_back(0);  // A window may be loaded past the last word.
+    bytes_[block] = reinterpret_cast<const unsigned char*>(words_[block].data());
   }
 }
 
@@ -103,10 +99,13 @@ void Sweep<Sink>::add(const BoundaryVoxel& u, const CandidateLayer& layer, Inter
   if (!z_face && (u.faces & ~(kFaceZPlus | kFaceZMinus)) == 0) return;
   const LayerPaths& paths = this->paths(std::abs(c));
 
+  int y_sign = 0;  // Of the row before.
   Rays rays{};
+  rays.c = std::abs(c);
   rays.u = u.v;
   rays.row_u = std::int64_t{u.v.z} * grid_.ny + u.v.y;
-  rays.step_z = c < 0 ? -grid_.ny : grid_.ny;
+  rays.z_sign = c < 0 ? -1 : 1;
+  rays.step_z = rays.z_sign * grid_.ny;
   rows.first = std::max(rows.first, u.v.y - paths.rows() + 1);
   rows.last = std::min(rows.last, u.v.y + paths.rows() - 1);
   const auto first = std::lower_bound(layer.rows().begin(), layer.rows().end(), rows.first,
@@ -126,6 +125,9 @@ void Sweep<Sink>::add(const BoundaryVoxel& u, const CandidateLayer& layer, Inter
     };
     rays.y_sign = b < 0 ? -1 : 1;
     rays.step_y = rays.y_sign;
+    if (rays.y_sign != y_sign) last_[0].count = last_[1].count = 0;
+    y_sign = rays.y_sign;
+    rays.b = std::abs(b);
     rays.path = paths.path(std::abs(b));
     add_side<1>(rays, layer, *row, admit(kFaceXPlus));
     add_side<-1>(rays, layer, *row, admit(kFaceXMinus));
@@ -183,26 +185,28 @@ void Sweep<Sink>::add_side(const Rays& rays, const CandidateLayer& layer,
 template <class Sink>
 template <int kSide>
 void Sweep<Sink>::cast(const Rays& rays, Live& live) {
+  shade_again<kSide>(rays, live);
+  if (live.bits == 0) return;
   live.measure();
   shade<kSide>(rays, 0, live);
-  int level = 1;
+  int l = 1;
   for (int i = 1; i < rays.path.count && live.bits != 0;) {
     const PathCell& cell = rays.path.cells[i];
-    while ((1 << level) > cell.run) --level;
-    const int cells = 1 << level;
-    // Cells that differ in y only are one row of a higher level: its lowest y.
-    const int j = rays.y_sign > 0 ? cell.j : cell.j + cells - 1;
-    const std::int64_t row = rays.row_u + j * rays.step_y + cell.k * rays.step_z;
+    while ((1 << l) > cell.within[2]) --l;
+    // The next 2^l cells lie in 2^l rows of 2^m levels, of which a block names the lowest.
+    const int cells = 1 << l, m = (cells > cell.within[0]) + (cells > cell.within[1]);
+    const PathCell& end = rays.path.cells[i + cells - 1];
+    const int j = rays.y_sign > 0 ? cell.j : end.j, k = rays.z_sign > 0 ? cell.k : end.k;
+    const std::int64_t row = rays.row_u + j * rays.step_y + k * rays.step_z;
     const int first =
         static_cast<int>((static_cast<std::uint32_t>(live.low) * cell.in + 0x8000U) >> 16);
-    const int last = static_cast<int>(
-        (static_cast<std::uint32_t>(live.high) * rays.path.cells[i + cells - 1].out + 0x8000U) >>
-        16);
-    if (clear_window<kSide>(rays, level, row, first, last)) {
+    const int last =
+        static_cast<int>((static_cast<std::uint32_t>(live.high) * end.out + 0x8000U) >> 16);
+    if (clear_window<kSide>(rays, m * BlockedRows::kYSizes + l, row, first, last)) {
       i += cells;
-      level = std::min(level + 1, BlockedRows::kLevels - 1);
-    } else if (level > 0) {
-      level /= 4;
+      l = std::min(l + 1, BlockedRows::kYSizes - 1);
+    } else if (l > 0) {
+      l /= 4;
     } else {
       shade<kSide>(rays, i, live);
       ++i;
@@ -214,19 +218,19 @@ void Sweep<Sink>::cast(const Rays& rays, Live& live) {
 // reversed for the minus side.
 template <class Sink>
 template <int kSide>
-std::uint64_t Sweep<Sink>::window(const Rays& rays, int level, std::int64_t row, int first,
+std::uint64_t Sweep<Sink>::window(const Rays& rays, int block, std::int64_t row, int first,
                                   int width) const {
   const int x = kSide > 0 ? rays.u.x + first : rays.u.x - first - width + 1;
-  return blocked_.window(level, row, x, width);
+  return blocked_.window(block, row, x, width);
 }
 
 template <class Sink>
 template <int kSide>
-bool Sweep<Sink>::clear_window(const Rays& rays, int level, std::int64_t row, int first,
+bool Sweep<Sink>::clear_window(const Rays& rays, int block, std::int64_t row, int first,
                                int last) const {
   for (; last - first >= BlockedRows::kWindow; first += BlockedRows::kWindow)
-    if (window<kSide>(rays, level, row, first, BlockedRows::kWindow) != 0) return false;
-  return window<kSide>(rays, level, row, first, last - first + 1) == 0;
+    if (window<kSide>(rays, block, row, first, BlockedRows::kWindow) != 0) return false;
+  return window<kSide>(rays, block, row, first, last - first + 1) == 0;
 }
 
 // Clears what the blocked voxels of one cell shadow. u itself does not block.
@@ -248,14 +252,53 @@ void Sweep<Sink>::shade(const Rays& rays, int cell, Live& live) {
       const int length = std::countr_one(blocked >> begin);
       blocked &= ~(ones(length) << begin);
       const int r0 = kSide > 0 ? first + begin : first + width - begin - length;
-      const std::uint64_t shadow =
-          bits_within(live.first, times.shadow_first(r0), times.shadow_last(r0 + length - 1));
-      if ((live.bits & shadow) == 0) continue;
-      live.bits &= ~shadow;
-      sink_.hidden(row, kSide > 0 ? rays.u.x + r0 : rays.u.x - r0 - length + 1, length);
+      Run run{c.j, c.k, r0, r0 + length - 1};
+      if (begin == 0 || begin + length == width) extend<kSide>(rays, row, run);
+      hide<kSide>(rays, run, times, live);
     }
   }
   if (live.bits != 0) live.measure();
+}
+
+// Takes in what is blocked beyond both ends: the window shows of a wall only what matters here, but
+// the next row needs a little more.
+template <class Sink>
+template <int kSide>
+void Sweep<Sink>::extend(const Rays& rays, std::int64_t row, Run& run) const {
+  // In x, so that right is upwards; u itself stays out.
+  const int limit = kSide > 0 ? grid_.nx - 1 - rays.u.x : rays.u.x;
+  const int outer = std::min(limit - run.r1, BlockedRows::kWindow);
+  const int inner = std::min(run.r0 - 1, BlockedRows::kWindow);
+  const auto blocked = [&](int first, int width, bool upwards) {
+    const std::uint64_t bits = window<kSide>(rays, 0, row, first, width);
+    return upwards ? std::countr_one(bits) : std::countl_one(bits << (64 - width));
+  };
+  if (outer > 0) run.r1 += blocked(run.r1 + 1, outer, kSide > 0);
+  if (inner > 0) run.r0 -= blocked(run.r0 - inner, inner, kSide < 0);
+}
+
+// Clears what one run shadows, and keeps it in mind if that was anything.
+template <class Sink>
+template <int kSide>
+void Sweep<Sink>::hide(const Rays& rays, const Run& run, const PathTimes& times, Live& live) {
+  const std::uint64_t shadow =
+      bits_within(live.first, times.shadow_first(run.r0), times.shadow_last(run.r1));
+  if ((live.bits & shadow) == 0) return;
+  live.bits &= ~shadow;
+  LastRuns& last = last_[kSide > 0];
+  if (last.count < LastRuns::kMost) last.runs[last.count++] = run;
+  sink_.hidden(rays.row_u + run.j * rays.step_y + run.k * rays.step_z,
+               kSide > 0 ? rays.u.x + run.r0 : rays.u.x - run.r1, run.r1 - run.r0 + 1);
+}
+
+template <class Sink>
+template <int kSide>
+void Sweep<Sink>::shade_again(const Rays& rays, Live& live) {
+  const LastRuns before = last_[kSide > 0];
+  last_[kSide > 0].count = 0;
+  for (int i = 0; i < before.count && live.bits != 0; ++i)
+    if (const auto times = times_in_cell(rays.b, rays.c, before.runs[i].j, before.runs[i].k))
+      hide<kSide>(rays, before.runs[i], *times, live);
 }
 
 void SeenCounts::seen(const CandidateLayer&, const CandidateLayer::Row& row, int x,

@@ -14,26 +14,28 @@ namespace planning {
 // Throws std::invalid_argument that names what.
 void require_inside(const VoxelGrid& grid, Voxel v, const char* what);
 
-// What blocks the view (not seen-empty), one bit per voxel, and the same with 2, 4, 8 and 16 rows
-// or-ed together: row y of level l is blocked where any of rows y .. y + 2^l - 1 is.
+// What blocks the view (not seen-empty), one bit per voxel, and the same for blocks of rows or-ed
+// together: of block (l, m), row (y, z) is blocked where any of rows y .. y + 2^l - 1 of any of
+// levels z .. z + 2^m - 1 is.
 class BlockedRows {
  public:
-  static constexpr int kLevels = 5;
+  static constexpr int kYSizes = 5, kZSizes = 3;
   static constexpr int kWindow = 57;  // The widest window() that one load can give.
 
   explicit BlockedRows(const VoxelMap& map);
 
-  // Bits x .. x + width - 1 of row `row` (z ny + y), 1 <= width <= kWindow, 0 <= x.
-  std::uint64_t window(int level, std::int64_t row, int x, int width) const {
+  // Bits x .. x + width - 1 of row `row` (z ny + y) of block m * kYSizes + l, 1 <= width <=
+  // kWindow, 0 <= x.
+  std::uint64_t window(int block, std::int64_t row, int x, int width) const {
     std::uint64_t bits;
-    std::memcpy(&bits, bytes_[level] + row * row_bytes_ + (x >> 3), sizeof bits);
+    std::memcpy(&bits, bytes_[block] + row * row_bytes_ + (x >> 3), sizeof bits);
     return (bits >> (x & 7)) & ((std::uint64_t{1} << width) - 1);
   }
 
  private:
   std::int64_t row_bytes_;
-  std::vector<std::uint64_t> words_[kLevels];
-  const unsigned char* bytes_[kLevels];
+  std::vector<std::uint64_t> words_[kYSizes * kZSizes];
+  const unsigned char* bytes_[kYSizes * kZSizes];
 };
 
 // The seen-empty candidates of one layer as rows of bits, and where their tallies are kept.
@@ -96,8 +98,21 @@ class Sweep {
   struct Rays {
     Voxel u;
     std::int64_t row_u, step_y, step_z;  // Rows of BlockedRows.
-    int y_sign;
+    int b, c;                            // In voxels.
+    int y_sign, z_sign;
     LayerPaths::Path path;
+  };
+  // Blocked voxels x from r0 to r1 (from u, in the direction of a) of a row that is j and k steps
+  // along y and z from u.
+  struct Run {
+    int j, k, r0, r1;
+  };
+  // The runs that hid candidates of the row before: likely they do so again in the next one, and
+  // then the way there need not be gone.
+  struct LastRuns {
+    static constexpr int kMost = 4;
+    Run runs[kMost];
+    int count{};
   };
   // Candidates still visible: bit i for |a| = first + i.
   struct Live {
@@ -114,17 +129,24 @@ class Sweep {
   template <int kSide>
   void cast(const Rays& rays, Live& live);
   template <int kSide>
+  void shade_again(const Rays& rays, Live& live);
+  template <int kSide>
   void shade(const Rays& rays, int cell, Live& live);
   template <int kSide>
-  std::uint64_t window(const Rays& rays, int level, std::int64_t row, int first, int width) const;
+  void extend(const Rays& rays, std::int64_t row, Run& run) const;
   template <int kSide>
-  bool clear_window(const Rays& rays, int level, std::int64_t row, int first, int last) const;
+  void hide(const Rays& rays, const Run& run, const PathTimes& times, Live& live);
+  template <int kSide>
+  std::uint64_t window(const Rays& rays, int block, std::int64_t row, int first, int width) const;
+  template <int kSide>
+  bool clear_window(const Rays& rays, int block, std::int64_t row, int first, int last) const;
 
   const VoxelGrid& grid_;
   const BlockedRows& blocked_;
   ViewRule rule_;
   static constexpr std::size_t kPathsKept = 4;
   std::vector<LayerPaths> paths_;  // Of the last few |c| asked for, the latest at the end.
+  LastRuns last_[2];               // Of each side.
   Sink sink_;
 };
 

@@ -1,10 +1,17 @@
-// The tally of Phase II: ours, the pruned walk of every pair, OctoMap's rays.
+// The tally of Phase II: ours, a well-made walk of every pair that may count, OctoMap's rays; and
+// the tally kept up to date from view to view.
 #include <benchmark/benchmark.h>
+#include <malloc.h>
 #include <octomap/octomap.h>
+
+#include <fstream>
+#include <map>
+#include <string>
 
 #include "planning/never_visible.hpp"
 #include "planning/next_best_view.hpp"
 #include "planning/next_views.hpp"
+#include "planning/running_tally.hpp"
 #include "planning/stop_certificate.hpp"
 #include "tests/planning/voxel_oracle.hpp"
 #include "tests/planning/voxel_worlds.hpp"
@@ -16,41 +23,57 @@ using planning::ViewLimits;
 using planning::Voxel;
 using planning::VoxelMap;
 
-// A made-up fort of 300 x 300 m after a few scans with a coarse scanner, so that much is left.
-struct Site {
-  worlds::World world = worlds::fort(300, 1);
+constexpr ViewLimits kLimits{1, 100, 70};
+
+// What a tally is asked for.
+struct Question {
   VoxelMap map;
   std::vector<BoundaryVoxel> boundary;
   std::vector<Voxel> candidates;
-  ViewLimits limits{1, 100, 70};
+};
+
+// A made-up fort of 300 x 300 m, scanned with a coarse scanner, so that much is left.
+struct Site {
+  worlds::World world = worlds::fort(300, 1);
+  worlds::Random random{3};
+  VoxelMap map;
 
   explicit Site(double voxel_m)
       : map({{0, 0, -voxel_m / 2},
              voxel_m,
              static_cast<int>(300 / voxel_m),
              static_cast<int>(300 / voxel_m),
-             static_cast<int>(30 / voxel_m)}) {
-    worlds::Random random(3);
+             static_cast<int>(30 / voxel_m)}) {}
+
+  void scan(const Eigen::Isometry3d& pose) {
     planning::InsertConfig config;
     config.threads = 2;
-    for (const Eigen::Isometry3d& pose : worlds::stations(world, 300, 14, 2))
-      map.insert(world.scan(worlds::sphere(0.5, 0.25), pose, 100, random), pose, config);
-    boundary = planning::boundary_unseen(map);
-    candidates = worlds::cells(map, world, map.grid().voxel_at({0, 0, 1.8}).z);
+    map.insert(world.scan(worlds::sphere(0.5, 0.25), pose, 100, random), pose, config);
+  }
+  void scan_stations(int count) {
+    for (const Eigen::Isometry3d& pose : worlds::stations(world, 300, count, 2)) scan(pose);
+  }
+  Question question() const {
+    return {map, planning::boundary_unseen(map),
+            worlds::cells(map, world, map.grid().voxel_at({0, 0, 1.8}).z)};
   }
 };
 
-const Site& site(std::int64_t voxel_cm) {
-  static const Site one_m(1);
-  if (voxel_cm == 100) return one_m;
-  static const Site half_m(0.5);
-  return half_m;
+// After 7 scans.
+const Question& question(std::int64_t voxel_cm) {
+  static std::map<std::int64_t, Question> questions;
+  if (!questions.contains(voxel_cm)) {
+    Site site(static_cast<double>(voxel_cm) / 100);
+    site.scan_stations(7);
+    questions.emplace(voxel_cm, site.question());
+  }
+  return questions.at(voxel_cm);
 }
 
-void finish(benchmark::State& state, const Site& s, std::uint64_t pairs) {
-  state.counters["voxels"] = static_cast<double>(s.map.grid().size());
-  state.counters["boundary"] = static_cast<double>(s.boundary.size());
-  state.counters["candidates"] = static_cast<double>(s.candidates.size());
+void finish(benchmark::State& state, const Question& q, std::uint64_t pairs) {
+  state.counters["voxels"] = static_cast<double>(q.map.grid().size());
+  state.counters["boundary"] = static_cast<double>(q.boundary.size());
+  state.counters["candidates"] = static_cast<double>(q.candidates.size());
   state.counters["seen_pairs"] = static_cast<double>(pairs);
 }
 
@@ -60,81 +83,224 @@ std::uint64_t sum(const std::vector<std::uint32_t>& tally) {
   return result;
 }
 
-// Arguments: threads, voxel size in cm.
+// A line of /proc/self/status, in MB.
+double status_mb(const std::string& key) {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);)
+    if (line.starts_with(key + ":")) return std::stod(line.substr(key.size() + 1)) / 1024;
+  return 0;
+}
+
+// Arguments: threads, voxel size in cm. peak_mb: resident memory at its highest, less before.
 void Tally(benchmark::State& state) {
-  const Site& s = site(state.range(1));
+  const Question& q = question(state.range(1));
+  malloc_trim(0);
+  std::ofstream("/proc/self/clear_refs") << 5;  // Resets the peak.
+  const double before_mb = status_mb("VmRSS");
   std::uint64_t pairs = 0;
   for (auto _ : state)
-    pairs = sum(planning::tally(s.map, s.boundary, s.candidates, s.limits,
+    pairs = sum(planning::tally(q.map, q.boundary, q.candidates, kLimits,
                                 static_cast<int>(state.range(0))));
-  finish(state, s, pairs);
+  finish(state, q, pairs);
+  state.counters["peak_mb"] = status_mb("VmHWM") - before_mb;
 }
-BENCHMARK(Tally)->ArgsProduct({{1, 2}, {100, 50}})->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(Tally)
+    ->ArgsProduct({{1, 2}, {100}})
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime()
+    ->MeasureProcessCPUTime();
+BENCHMARK(Tally)
+    ->ArgsProduct({{1, 2}, {56}})
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime()
+    ->MeasureProcessCPUTime()
+    ->Iterations(1);
 
-// Every pair in range and at a fair angle, walked until something blocks.
+// The reference: one byte per voxel, boundary voxel by boundary voxel, every candidate in range and
+// at a fair angle, walked from face to face until something blocks; integers throughout.
+class Walker {
+ public:
+  explicit Walker(const Question& q) : q_(q), rule_(kLimits, q.map.grid().voxel_m) {
+    const planning::VoxelGrid& grid = q.map.grid();
+    blocked_.reserve(grid.size());
+    for (int z = 0; z < grid.nz; ++z)
+      for (int y = 0; y < grid.ny; ++y)
+        for (int x = 0; x < grid.nx; ++x)
+          blocked_.push_back(q.map.at({x, y, z}) != planning::VoxelState::seen_empty);
+    row_begin_.resize(static_cast<std::size_t>(grid.ny) + 1);
+    for (const Voxel p : q.candidates) ++row_begin_[static_cast<std::size_t>(p.y) + 1];
+    for (std::size_t y = 1; y < row_begin_.size(); ++y) row_begin_[y] += row_begin_[y - 1];
+  }
+
+  std::uint64_t count(const BoundaryVoxel& u, std::vector<std::uint32_t>& tally) const {
+    const auto reach = static_cast<int>(std::sqrt(static_cast<double>(rule_.distance2_max())));
+    std::uint64_t seen = 0;
+    for (int y = std::max(u.v.y - reach, 0); y <= std::min(u.v.y + reach, q_.map.grid().ny - 1);
+         ++y) {
+      const auto row = q_.candidates.begin() + row_begin_[static_cast<std::size_t>(y)];
+      const auto end = q_.candidates.begin() + row_begin_[static_cast<std::size_t>(y) + 1];
+      const auto width = static_cast<int>(std::sqrt(reach * reach - (y - u.v.y) * (y - u.v.y))) + 1;
+      auto p = std::lower_bound(row, end, u.v.x - width, [](Voxel v, int x) { return v.x < x; });
+      for (; p != end && p->x <= u.v.x + width; ++p)
+        if (rule_.admits(u, *p) && clear(u.v, *p)) {
+          ++tally[static_cast<std::size_t>(p - q_.candidates.begin())];
+          ++seen;
+        }
+    }
+    return seen;
+  }
+
+ private:
+  bool clear(Voxel u, Voxel p) const {
+    const std::ptrdiff_t nx = q_.map.grid().nx, nxy = nx * q_.map.grid().ny;
+    const std::int64_t dx = std::abs(p.x - u.x), dy = std::abs(p.y - u.y), dz = std::abs(p.z - u.z);
+    const std::int64_t wx = std::max<std::int64_t>(dx, 1), wy = std::max<std::int64_t>(dy, 1),
+                       wz = std::max<std::int64_t>(dz, 1);
+    const std::ptrdiff_t step_x = p.x < u.x ? -1 : 1, step_y = p.y < u.y ? -nx : nx,
+                         step_z = p.z < u.z ? -nxy : nxy;
+    std::int64_t next_x = dx == 0 ? INT64_MAX : wy * wz, next_y = dy == 0 ? INT64_MAX : wx * wz,
+                 next_z = dz == 0 ? INT64_MAX : wx * wy;
+    const std::uint8_t* at = &blocked_[static_cast<std::size_t>(u.z * nxy + u.y * nx + u.x)];
+    const std::uint8_t* const end = &blocked_[static_cast<std::size_t>(p.z * nxy + p.y * nx + p.x)];
+    while (at != end) {
+      const std::int64_t now = std::min({next_x, next_y, next_z});
+      if (next_x == now) at += step_x, next_x += 2 * wy * wz;
+      if (next_y == now) at += step_y, next_y += 2 * wx * wz;
+      if (next_z == now) at += step_z, next_z += 2 * wx * wy;
+      if (at != end && *at != 0) return false;
+    }
+    return true;
+  }
+
+  const Question& q_;
+  planning::ViewRule rule_;
+  std::vector<std::uint8_t> blocked_;
+  std::vector<std::ptrdiff_t> row_begin_;
+};
+
+// Arguments: voxel size in cm; every how many boundary voxels. Multiply the time by the latter.
 void TallyByWalking(benchmark::State& state) {
-  const Site& s = site(100);
+  const Question& q = question(state.range(0));
+  std::vector<std::uint32_t> tally(q.candidates.size());
   std::uint64_t pairs = 0;
   for (auto _ : state) {
     pairs = 0;
-    for (const Voxel p : s.candidates)
-      pairs += planning::visible_from(s.map, s.boundary, p, s.limits).size();
+    const Walker walker(q);
+    for (std::size_t i = 0; i < q.boundary.size(); i += static_cast<std::size_t>(state.range(1)))
+      pairs += walker.count(q.boundary[i], tally);
   }
-  finish(state, s, pairs);
+  finish(state, q, pairs);
 }
-BENCHMARK(TallyByWalking)->Unit(benchmark::kMillisecond)->UseRealTime()->Iterations(1);
+BENCHMARK(TallyByWalking)
+    ->Args({100, 1})
+    ->Args({56, 50})
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime()
+    ->MeasureProcessCPUTime()
+    ->Iterations(1);
+
+// The fort after 20 stations, and after each of 9 next best views.
+const std::vector<Question>& mission() {
+  static const std::vector<Question> questions = [] {
+    Site site(1);
+    site.scan_stations(20);
+    std::vector<Question> result{site.question()};
+    while (result.size() < 10) {
+      const Question& q = result.back();
+      const auto best =
+          planning::best(planning::tally(q.map, q.boundary, q.candidates, kLimits, 2));
+      Eigen::Vector3d W_view_m = q.map.grid().center_m(q.candidates[best->candidate]);
+      W_view_m.z() = 1.8;
+      site.scan(worlds::upright(W_view_m, 0.3));
+      result.push_back(site.question());
+    }
+    return result;
+  }();
+  return questions;
+}
+
+// All tallies after the first. Argument: 0 anew, 1 kept up to date.
+void TalliesOfPhaseTwo(benchmark::State& state) {
+  const std::vector<Question>& questions = mission();
+  std::uint64_t pairs = 0;
+  for (auto _ : state) {
+    state.PauseTiming();
+    planning::RunningTally running(kLimits, 1);
+    const Question& first = questions.front();
+    running.update(first.map, first.boundary, first.candidates);
+    state.counters["kept_mb"] = static_cast<double>(running.work().bytes) / 1e6;
+    state.ResumeTiming();
+    pairs = 0;
+    for (std::size_t i = 1; i < questions.size(); ++i) {
+      const Question& q = questions[i];
+      pairs += state.range(0) == 0 ? sum(planning::tally(q.map, q.boundary, q.candidates, kLimits))
+                                   : sum(running.update(q.map, q.boundary, q.candidates));
+    }
+  }
+  finish(state, questions.back(), pairs);
+}
+BENCHMARK(TalliesOfPhaseTwo)->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 void VisibleFrom(benchmark::State& state) {
-  const Site& s = site(100);
-  const Voxel p = s.candidates[s.candidates.size() / 2];
+  const Question& q = question(100);
+  const Voxel p = q.candidates[q.candidates.size() / 2];
   for (auto _ : state)
-    benchmark::DoNotOptimize(planning::visible_from(s.map, s.boundary, p, s.limits));
+    benchmark::DoNotOptimize(planning::visible_from(q.map, q.boundary, p, kLimits));
 }
 BENCHMARK(VisibleFrom)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 // Five views at once, given the tally (argument: threads).
 void NextViews(benchmark::State& state) {
-  const Site& s = site(100);
+  const Question& q = question(100);
   const int threads = static_cast<int>(state.range(0));
-  const auto counts = planning::tally(s.map, s.boundary, s.candidates, s.limits, threads);
+  const auto counts = planning::tally(q.map, q.boundary, q.candidates, kLimits, threads);
   std::vector<planning::PlannedView> views;
   for (auto _ : state)
     views = planning::next_views(s.map, s.boundary, s.candidates, counts, s.limits,
                                  {.views_max = 5, .adds_min_voxels = 1, .threads = threads});
   std::uint64_t adds = 0;
   for (const planning::PlannedView& view : views) adds += view.adds_voxels;
-  finish(state, s, adds);
+  finish(state, q, adds);
 }
 BENCHMARK(NextViews)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 // Both tallies of the stop certificate.
 void StopCertificate(benchmark::State& state) {
-  const Site& s = site(100);
+  const Question& q = question(100);
   planning::OptimisticConfig config;
   config.threads = static_cast<int>(state.range(0));
   planning::StopCertificate certificate;
   for (auto _ : state)
-    certificate =
-        planning::stop_certificate(s.map, s.boundary, s.candidates, s.limits, 100, config);
-  finish(state, s, certificate.optimistic_max());
+    certificate = planning::stop_certificate(q.map, q.boundary, q.candidates, kLimits, 100, config);
+  finish(state, q, certificate.optimistic_max());
 }
 BENCHMARK(StopCertificate)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 void NeverVisible(benchmark::State& state) {
-  const Site& s = site(100);
+  const Question& q = question(100);
   std::size_t never = 0;
   for (auto _ : state)
-    never = planning::never_visible(s.map, s.boundary, s.candidates, s.limits,
+    never = planning::never_visible(q.map, q.boundary, q.candidates, kLimits,
                                     static_cast<int>(state.range(0)))
                 .size();
-  finish(state, s, never);
+  finish(state, q, never);
 }
 BENCHMARK(NeverVisible)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
 
+// The same, looked up.
+void VisibleFromRunningTally(benchmark::State& state) {
+  const Question& q = question(100);
+  planning::RunningTally running(kLimits, 2);
+  running.update(q.map, q.boundary, q.candidates);
+  const Voxel p = q.candidates[q.candidates.size() / 2];
+  for (auto _ : state) benchmark::DoNotOptimize(running.visible(p));
+}
+BENCHMARK(VisibleFromRunningTally)->Unit(benchmark::kMillisecond)->UseRealTime();
+
 // OctoMap's computeRayKeys and search for every 400th boundary voxel; multiply by 400.
 void TallyPartByOctomapKeyRays(benchmark::State& state) {
-  const Site& s = site(100);
-  const planning::VoxelGrid& grid = s.map.grid();
+  const Question& q = question(100);
+  const planning::VoxelGrid& grid = q.map.grid();
   octomap::OcTree tree(1.0);
   const auto point = [](Voxel v) {
     return octomap::point3d(static_cast<float>(v.x) + 0.5F, static_cast<float>(v.y) + 0.5F,
@@ -143,10 +309,10 @@ void TallyPartByOctomapKeyRays(benchmark::State& state) {
   for (int z = 0; z < grid.nz; ++z)
     for (int y = 0; y < grid.ny; ++y)
       for (int x = 0; x < grid.nx; ++x)
-        if (s.map.at({x, y, z}) != planning::VoxelState::unseen)
+        if (q.map.at({x, y, z}) != planning::VoxelState::unseen)
           tree.updateNode(point({x, y, z}),
-                          s.map.at({x, y, z}) == planning::VoxelState::seen_occupied, true);
-  const planning::ViewRule rule(s.limits, 1);
+                          q.map.at({x, y, z}) == planning::VoxelState::seen_occupied, true);
+  const planning::ViewRule rule(kLimits, 1);
   std::uint64_t pairs = 0;
   octomap::KeyRay ray;
   const auto clear = [&](Voxel u, Voxel p) {
@@ -161,11 +327,11 @@ void TallyPartByOctomapKeyRays(benchmark::State& state) {
   };
   for (auto _ : state) {
     pairs = 0;
-    for (std::size_t i = 0; i < s.boundary.size(); i += 400)
-      for (const Voxel p : s.candidates)
-        pairs += rule.admits(s.boundary[i], p) && clear(s.boundary[i].v, p);
+    for (std::size_t i = 0; i < q.boundary.size(); i += 400)
+      for (const Voxel p : q.candidates)
+        pairs += rule.admits(q.boundary[i], p) && clear(q.boundary[i].v, p);
   }
-  finish(state, s, pairs);
+  finish(state, q, pairs);
 }
 BENCHMARK(TallyPartByOctomapKeyRays)->Unit(benchmark::kMillisecond)->UseRealTime()->Iterations(1);
 
