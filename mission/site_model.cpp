@@ -83,8 +83,8 @@ SiteModel::SiteModel(const MissionConfig& config, const nav::SiteMap& map,
       threads_(threads),
       map_(voxel_grid(config, map, tasks_),
            layers_kept(config, voxel_grid(config, map, tasks_), tasks_)),
-      density_(config.robot.scanner, config.phase2.density_min_ppm2, threads),
-      tally_(view_limits(config.robot.scanner), threads) {
+      tally_(view_limits(config.robot.scanner), threads),
+      density_(config.robot.scanner, config.phase2.density_min_ppm2, threads) {
   if (config_.phase2.foliage) beams_.emplace(map_);
   find_cells();
   const planning::VoxelGrid& grid = map_.grid();

@@ -205,7 +205,7 @@ std::vector<std::uint8_t> seen_by_any(const VoxelMap& map,
                                       const std::vector<Voxel>& candidates,
                                       const ViewLimits& limits, int threads) {
   const ViewRule rule(limits, map.grid().voxel_m);
-  for (const BoundaryVoxel& u : boundary) check(map.grid(), u.v, "boundary voxel");
+  for (const BoundaryVoxel& u : boundary) require_inside(map.grid(), u.v, "boundary voxel");
   const SortedCandidates sorted = sort_candidates(map, candidates);
   const BlockedRows blocked(map);
   std::vector<Sweep<AnySeen>> sweeps(static_cast<std::size_t>(std::max(threads, 1)),
