@@ -1,0 +1,44 @@
+// The dialogue that brings an LMS from power-up to streaming scans, as a list of settings with the
+// answers that are expected.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "drivers/cola_codec.hpp"
+
+namespace drivers {
+
+struct LmsSettings {
+  bool lms5xx{};
+  bool remission{};  // RSSI beside the distances.
+  std::int32_t frequency_centihz = 5000;
+  std::int32_t resolution_1e4deg = 5000;
+  std::int32_t start_1e4deg = -450000;  // Device angles: 90 degrees is straight ahead.
+  std::int32_t stop_1e4deg = 2250000;
+  std::uint16_t every_nth_scan = 1;
+};
+
+// Empty, or why no such scanner has these settings, with what it has.
+std::string lms_settings_problem(const LmsSettings& settings);
+
+struct LmsStep {
+  std::string_view purpose;
+  Bytes request;
+  std::string_view command, name;  // Of the answer.
+  Bytes body;                      // Of the answer; empty: any.
+  double timeout_s = 2;
+  bool may_fail{};  // Informative: go on without an answer.
+};
+
+std::vector<LmsStep> lms_startup(ColaDialect dialect, const LmsSettings& settings);
+std::vector<LmsStep> lms_stop(ColaDialect dialect);
+
+enum class LmsAnswer { accepted, refused, unrelated };
+// Answers are matched by name: events and late answers may come between.
+LmsAnswer lms_judge(const LmsStep& step, const ColaMessage& message);
+// What a refusal says, for people: the fault's name and remedy.
+std::string lms_refusal(const LmsStep& step, const ColaMessage& message);
+
+}  // namespace drivers
