@@ -28,6 +28,17 @@ constexpr Fault kStates[] = {
     {7, "measuring", "none: this is how it works", "none"},
 };
 
+constexpr Fault kDeviceStates[] = {
+    {0, "busy", "starting up, or at work on some firmware", "ask STlms"},
+    {1, "ready", "none: this is how it works", "none"},
+    {2, "error", "the scanner reports a fault of its own", "restart it, then replace it"},
+    {3, "standby", "not measuring", "send LMCstartmeas"},
+};
+
+constexpr Fault kStartErrors[] = {
+    {1, "not allowed", "not logged in, or already starting", "log in, stop, then start again"},
+};
+
 constexpr Fault kScanConfigErrors[] = {
     {1, "frequency", "this model does not scan at this frequency", "choose a listed frequency"},
     {2, "resolution", "this model has no such resolution", "choose a listed resolution"},

@@ -91,9 +91,12 @@ double lms_range_m(const LmsChannel& channel, std::uint16_t raw);
 
 // Of a scan's status bytes.
 std::vector<const Fault*> lms_faults(const LmsScan& scan);
-// By code: STlms, and the answer of mLMPsetscancfg.
+// By code: STlms, SCdevicestate (informative: some say busy while they work), and the answers of
+// mLMPsetscancfg and LMCstartmeas.
 std::span<const Fault> lms_states();
+std::span<const Fault> lms_device_states();
 std::span<const Fault> lms_scan_config_errors();
+std::span<const Fault> lms_start_errors();
 
 // Tells repeated telegrams (some firmware sends one twice) and lost scans by the counters.
 class LmsSequence {

@@ -151,6 +151,8 @@ std::string lms_refusal(const LmsStep& step, const ColaMessage& message) {
     fault = fault_of(cola_errors(), *code);
   else if (step.name == "mLMPsetscancfg")
     fault = fault_of(lms_scan_config_errors(), ColaReader(message).u8());
+  else if (step.name == "LMCstartmeas")
+    fault = fault_of(lms_start_errors(), ColaReader(message).u8());
   if (fault == nullptr) return text;
   return text + ": " + std::string(fault->name) + " (" + std::string(fault->cause) +
          "): " + std::string(fault->remedy);

@@ -172,7 +172,10 @@ bool is_hex(std::uint8_t c) {
 
 // Lines end in a checksum of two digits or, where register 30 says so, a CRC of four.
 Look look_line(ByteView front) {
-  const auto star = std::find(front.begin(), front.end(), '*');
+  const auto star = std::find_if(front.begin() + 1, front.end(), [](std::uint8_t byte) {
+    return byte < 0x20 || byte > 0x7E || byte == '$' || byte == '*';
+  });
+  if (star != front.end() && *star != '*') return look_gnss(front);
   const auto at = static_cast<std::size_t>(star - front.begin());
   std::size_t digits = 0;
   while (digits < 4 && at + 1 + digits < front.size() && is_hex(front[at + 1 + digits])) ++digits;

@@ -343,6 +343,28 @@ TEST(SickLms, TheAsciiDialogueIsTheSheets) {
             "SetAccessMode 3 first");
 }
 
+TEST(SickLms, StatesAreNamed) {
+  for (std::uint32_t state = 0; state <= 7; ++state)
+    EXPECT_NE(fault_of(lms_states(), state), nullptr);
+  for (std::uint32_t state = 0; state <= 3; ++state)
+    EXPECT_NE(fault_of(lms_device_states(), state), nullptr);
+  EXPECT_EQ(fault_of(lms_states(), 7)->name, "measuring");
+  const auto faults = [](std::uint8_t first, std::uint8_t second) {
+    LmsScan scan;
+    scan.status = {first, second};
+    std::vector<std::string_view> names;
+    for (const Fault* fault : lms_faults(scan)) names.push_back(fault->name);
+    return names;
+  };
+  using Names = std::vector<std::string_view>;
+  EXPECT_EQ(faults(0, 0), Names{});
+  EXPECT_EQ(faults(1, 0), Names{"just started"});
+  EXPECT_EQ(faults(0, 1), Names{"device error"});
+  EXPECT_EQ(faults(0, 2), Names{"pollution warning"});
+  EXPECT_EQ(faults(0, 4), Names{"pollution error"});
+  EXPECT_EQ(faults(1, 5), (Names{"pollution error", "just started"}));
+}
+
 TEST(Cola, ErrorsAreNamedInEitherWidthAndDialect) {
   const auto code = [](ColaDialect dialect, const Bytes& payload) {
     const Bytes frame = frame_cola(dialect, payload);
