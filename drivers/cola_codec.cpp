@@ -137,6 +137,7 @@ std::optional<ColaMessage> parse_cola(ByteView frame) {
     if (text.size() < 5 || text[3] != ' ') return std::nullopt;
     const auto end = std::min(text.find(' ', 4), text.size());
     message.name = text.substr(4, end - 4);
+    if (message.name.empty()) return std::nullopt;
     at = end;
   }
   // A binary sFA may hold its code without a blank, and the code may look like one.

@@ -4,7 +4,7 @@
 #include "drivers/gnss_demux.hpp"
 #include "drivers/gpsd_codec.hpp"
 #include "drivers/nmea_codec.hpp"
-#include "drivers/offline_fields.hpp"
+#include "drivers/offline_stream.hpp"
 #include "drivers/text.hpp"
 #include "drivers/ubx_codec.hpp"
 
@@ -217,73 +217,45 @@ void say_rtcm3(Message& out, ByteView frame) {
   Fields(out).add("size", frame.size());
 }
 
-class GnssOffline : public OfflineDecoder {
+std::string_view say_nmea(Message& out, ByteView frame) {
+  const auto sentence = parse_nmea(frame);
+  if (!sentence) return "NMEA field";
+  out.name = sentence->talker + sentence->type;
+  Fields fields(out);
+  std::visit([&](const auto& value) { say(fields, value); }, sentence->value);
+  return {};
+}
+
+class GnssOffline : public OfflineStream {
  public:
-  void feed(const Captured& captured, const std::function<void(Message)>& out) override {
-    Resync& stream = streams_.of(captured.from_device);
-    stream.feed(captured.bytes);
-    while (const auto frame = stream.next(look_gnss)) {
-      Message message{"", captured.t_s, captured.from_device, {}};
-      const GnssKind kind = gnss_kind(*frame);
-      if (kind == GnssKind::ubx) say_ubx(message, *frame);
-      if (kind == GnssKind::rtcm3) say_rtcm3(message, *frame);
-      if (kind == GnssKind::nmea && !say_nmea(message, *frame)) continue;
-      out(std::move(message));
-    }
-  }
-  SkippedBy skipped() const override {
-    SkippedBy all = streams_.skipped();
-    if (refused_.times > 0) all["NMEA field"] = refused_;
-    return all;
-  }
+  GnssOffline() : OfflineStream(look_gnss, kGnssFrameMax) {}
 
  private:
-  bool say_nmea(Message& out, ByteView frame) {
-    const auto sentence = parse_nmea(frame);
-    if (!sentence) {
-      ++refused_.times;
-      refused_.bytes += frame.size();
-      return false;
-    }
-    out.name = sentence->talker + sentence->type;
-    Fields fields(out);
-    std::visit([&](const auto& value) { say(fields, value); }, sentence->value);
-    return true;
+  std::string_view say(ByteView frame, Message& message) override {
+    const GnssKind kind = gnss_kind(frame);
+    if (kind == GnssKind::nmea) return say_nmea(message, frame);
+    kind == GnssKind::ubx ? say_ubx(message, frame) : say_rtcm3(message, frame);
+    return {};
   }
-
-  TwoStreams streams_{kGnssFrameMax};
-  Skipped refused_;
 };
 
-class GpsdOffline : public OfflineDecoder {
+std::string_view say_gpsd(Message& out, ByteView line) {
+  constexpr const char* kNames[] = {"", "TPV", "SKY", "GST", "ATT", "VERSION", "ERROR"};
+  const auto parsed = parse_gpsd(line);
+  if (!parsed) return "no JSON object";
+  const auto* other = std::get_if<GpsdOther>(&*parsed);
+  out.name = other != nullptr ? other->name : kNames[parsed->index()];
+  Fields fields(out);
+  std::visit([&](const auto& value) { say(fields, value); }, *parsed);
+  return {};
+}
+
+class GpsdOffline : public OfflineStream {
  public:
-  void feed(const Captured& captured, const std::function<void(Message)>& out) override {
-    Resync& stream = streams_.of(captured.from_device);
-    stream.feed(captured.bytes);
-    while (const auto line = stream.next(look_gpsd)) {
-      const auto parsed = parse_gpsd(*line);
-      if (!parsed) {
-        ++refused_.times;
-        refused_.bytes += line->size();
-        continue;
-      }
-      Message message{kNames[parsed->index()], captured.t_s, captured.from_device, {}};
-      if (const auto* other = std::get_if<GpsdOther>(&*parsed)) message.name = other->name;
-      Fields fields(message);
-      std::visit([&](const auto& value) { say(fields, value); }, *parsed);
-      out(std::move(message));
-    }
-  }
-  SkippedBy skipped() const override {
-    SkippedBy all = streams_.skipped();
-    if (refused_.times > 0) all["no JSON object"] = refused_;
-    return all;
-  }
+  GpsdOffline() : OfflineStream(look_gpsd, kGpsdLineMax) {}
 
  private:
-  static constexpr const char* kNames[] = {"", "TPV", "SKY", "GST", "ATT", "VERSION", "ERROR"};
-  TwoStreams streams_{kGpsdLineMax};
-  Skipped refused_;
+  std::string_view say(ByteView line, Message& message) override { return say_gpsd(message, line); }
 };
 
 }  // namespace

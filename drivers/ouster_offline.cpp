@@ -1,6 +1,6 @@
 #include <utility>
 
-#include "drivers/offline_fields.hpp"
+#include "drivers/offline_stream.hpp"
 #include "drivers/ouster_codec.hpp"
 
 namespace drivers {
@@ -31,35 +31,29 @@ void add_packet(Fields& fields, const OusterPacket& packet, bool legacy) {
   fields.add("near_ir", packet.near_ir).faults(ouster_faults(packet));
 }
 
-class Offline : public OfflineDecoder {
+class Offline : public OfflineDatagrams {
  public:
   explicit Offline(OusterMetadata metadata) : metadata_(std::move(metadata)) {}
 
-  void feed(const Captured& captured, const std::function<void(Message)>& out) override {
-    OusterImu imu;
-    Message message{"lidar packet", captured.t_s, captured.from_device, {}};
-    Fields fields(message);
-    const auto why = decode_ouster(captured.bytes, metadata_, packet_);
-    if (why.empty()) {
-      add_packet(fields, packet_, metadata_.profile == OusterProfile::legacy);
-    } else if (decode_ouster_imu(captured.bytes, imu).empty()) {
-      message.name = "IMU packet";
-      fields.add("accel_ns", imu.accel_ns).add("gyro_ns", imu.gyro_ns);
-      fields.add("accel_g", imu.accel_g).add("gyro_degps", imu.gyro_degps);
-    } else {
-      Skipped& skipped = skipped_[std::string(why)];
-      ++skipped.times;
-      skipped.bytes += captured.bytes.size();
-      return;
-    }
-    out(std::move(message));
-  }
-  SkippedBy skipped() const override { return skipped_; }
-
  private:
+  std::string_view say(ByteView bytes, Message& message) override {
+    Fields fields(message);
+    OusterImu imu;
+    const auto why = decode_ouster(bytes, metadata_, packet_);
+    if (why.empty()) {
+      message.name = "lidar packet";
+      add_packet(fields, packet_, metadata_.profile == OusterProfile::legacy);
+      return {};
+    }
+    if (!decode_ouster_imu(bytes, imu).empty()) return why;
+    message.name = "IMU packet";
+    fields.add("accel_ns", imu.accel_ns).add("gyro_ns", imu.gyro_ns);
+    fields.add("accel_g", imu.accel_g).add("gyro_degps", imu.gyro_degps);
+    return {};
+  }
+
   OusterMetadata metadata_;
   OusterPacket packet_;
-  SkippedBy skipped_;
 };
 
 }  // namespace

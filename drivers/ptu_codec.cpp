@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "drivers/offline_fields.hpp"
+#include "drivers/offline_stream.hpp"
 #include "drivers/text.hpp"
 
 namespace drivers {
@@ -60,35 +60,31 @@ constexpr Fault kLimit{0, "beyond a limit", "the position or speed is beyond wha
 
 constexpr double kStepTurn_arcsec = 360.0 * 3600.0;
 
-class Offline : public OfflineDecoder {
+class Offline : public OfflineStream {
  public:
-  void feed(const Captured& captured, const std::function<void(Message)>& out) override {
-    if (!captured.from_device) return say_request(captured, out);
-    stream_.feed(captured.bytes);
-    while (const auto frame = stream_.next(look_ptu)) {
-      const PtuAnswer answer = parse_ptu(*frame);
-      Message message{answer.ok ? "answer" : "refusal", captured.t_s, true, {}};
-      Fields fields(message);
-      fields.add("text", answer.text);
-      if (!answer.echo.empty()) fields.add("echo", answer.echo);
-      if (answer.pan_limits > 0) fields.add("pan_limits", answer.pan_limits);
-      if (answer.tilt_limits > 0) fields.add("tilt_limits", answer.tilt_limits);
-      const auto numbers = ptu_numbers(answer);
-      if (!numbers.empty()) fields.add("numbers", numbers);
-      if (const Fault* fault = ptu_fault(answer)) fields.faults(std::array{fault});
-      out(std::move(message));
-    }
-  }
-  SkippedBy skipped() const override { return stream_.skipped(); }
+  Offline() : OfflineStream(look_ptu, kPtuLineMax) {}
 
- private:
-  static void say_request(const Captured& captured, const std::function<void(Message)>& out) {
+  void feed(const Captured& captured, const std::function<void(Message)>& out) override {
+    if (captured.from_device) return OfflineStream::feed(captured, out);
     Message message{"request", captured.t_s, false, {}};
     Fields(message).add("text", trimmed(as_text(captured.bytes)));
     out(std::move(message));
   }
 
-  Resync stream_{kPtuLineMax};
+ private:
+  std::string_view say(ByteView frame, Message& message) override {
+    const PtuAnswer answer = parse_ptu(frame);
+    message.name = answer.ok ? "answer" : "refusal";
+    Fields fields(message);
+    fields.add("text", answer.text);
+    if (!answer.echo.empty()) fields.add("echo", answer.echo);
+    if (answer.pan_limits > 0) fields.add("pan_limits", answer.pan_limits);
+    if (answer.tilt_limits > 0) fields.add("tilt_limits", answer.tilt_limits);
+    const auto numbers = ptu_numbers(answer);
+    if (!numbers.empty()) fields.add("numbers", numbers);
+    if (const Fault* fault = ptu_fault(answer)) fields.faults(std::array{fault});
+    return {};
+  }
 };
 
 }  // namespace

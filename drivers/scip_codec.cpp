@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <numbers>
 
-#include "drivers/offline_fields.hpp"
+#include "drivers/offline_stream.hpp"
 #include "drivers/text.hpp"
 
 namespace drivers {
@@ -117,29 +117,25 @@ std::string_view check_lines(std::span<const std::string_view> raw) {
   return {};
 }
 
-class Offline : public OfflineDecoder {
+class Offline : public OfflineStream {
  public:
-  void feed(const Captured& captured, const std::function<void(Message)>& out) override {
-    Resync& stream = streams_.of(captured.from_device);
-    stream.feed(captured.bytes);
-    while (const auto frame = stream.next(look_scip)) {
-      if (!parse_scip(*frame, reply_).empty()) continue;  // look_scip() has checked it.
-      Message message{
-          std::string(reply_.echo.substr(0, 2)), captured.t_s, captured.from_device, {}};
-      Fields fields(message);
-      fields.add("echo", reply_.echo).add("status", reply_.status);
-      if (decode_scip_scan(reply_, scan_).empty())
-        say(fields);
-      else if (const auto info = scip_info(reply_))
-        for (const auto& [key, value] : *info) fields.add(key, value);
-      if (const Fault* fault = scip_fault(reply_)) fields.faults(std::array{fault});
-      out(std::move(message));
-    }
-  }
-  SkippedBy skipped() const override { return streams_.skipped(); }
+  Offline() : OfflineStream(look_scip, kScipFrameMax) {}
 
  private:
-  void say(Fields& fields) const {
+  std::string_view say(ByteView frame, Message& message) override {
+    if (const auto why = parse_scip(frame, reply_); !why.empty()) return why;
+    message.name = reply_.echo.substr(0, 2);
+    Fields fields(message);
+    fields.add("echo", reply_.echo).add("status", reply_.status);
+    if (decode_scip_scan(reply_, scan_).empty())
+      say_scan(fields);
+    else if (const auto info = scip_info(reply_))
+      for (const auto& [key, value] : *info) fields.add(key, value);
+    if (const Fault* fault = scip_fault(reply_)) fields.faults(std::array{fault});
+    return {};
+  }
+
+  void say_scan(Fields& fields) const {
     fields.add("time_ms", scan_.time_ms)
         .add("step_first", scan_.step_first)
         .add("step_last", scan_.step_last)
@@ -148,7 +144,6 @@ class Offline : public OfflineDecoder {
     if (scan_.intensities) fields.add("intensities_raw", scan_.intensities_raw);
   }
 
-  TwoStreams streams_{kScipFrameMax};
   ScipReply reply_;
   ScipScan scan_;
 };

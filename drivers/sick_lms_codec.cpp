@@ -201,6 +201,12 @@ std::vector<const Fault*> lms_faults(const LmsScan& scan) {
 std::span<const Fault> lms_states() {
   return kStates;
 }
+std::span<const Fault> lms_device_states() {
+  return kDeviceStates;
+}
+std::span<const Fault> lms_start_errors() {
+  return kStartErrors;
+}
 std::span<const Fault> lms_scan_config_errors() {
   return kScanConfigErrors;
 }

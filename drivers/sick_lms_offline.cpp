@@ -1,6 +1,6 @@
 #include <algorithm>
 
-#include "drivers/offline_fields.hpp"
+#include "drivers/offline_stream.hpp"
 #include "drivers/sick_lms_codec.hpp"
 #include "drivers/text.hpp"
 
@@ -55,49 +55,31 @@ void add_scan(Fields& fields, const LmsScan& scan) {
   fields.faults(lms_faults(scan));
 }
 
-class Offline : public OfflineDecoder {
+class Offline : public OfflineStream {
  public:
-  void feed(const Captured& captured, const std::function<void(Message)>& out) override {
-    Resync& stream = streams_.of(captured.from_device);
-    stream.feed(captured.bytes);
-    while (const auto frame = stream.next(look_cola)) {
-      const auto message = parse_cola(*frame);
-      if (message)
-        out(say(*message, captured));
-      else
-        ++refused_["no command"].times, refused_["no command"].bytes += frame->size();
-    }
-  }
-  SkippedBy skipped() const override {
-    SkippedBy all = streams_.skipped();
-    for (const auto& [why, skipped] : refused_) {
-      all[why].times += skipped.times;
-      all[why].bytes += skipped.bytes;
-    }
-    return all;
-  }
+  Offline() : OfflineStream(look_cola, kColaFrameMax) {}
 
  private:
-  Message say(const ColaMessage& cola, const Captured& captured) {
-    Message message{std::string(cola.name), captured.t_s, captured.from_device, {}};
+  std::string_view say(ByteView frame, Message& message) override {
+    const auto cola = parse_cola(frame);
+    if (!cola) return "no command";
+    message.name = cola->name;
     Fields fields(message);
-    fields.add("command", cola.command);
-    if (const auto code = cola_error(cola)) {
+    fields.add("command", cola->command);
+    if (const auto code = cola_error(*cola)) {
       message.name = "sFA";
       fields.add("code", *code);
       if (const Fault* fault = fault_of(cola_errors(), *code)) fields.faults(std::array{fault});
-    } else if (cola.name == "LMDscandata" && (cola.command == "sSN" || cola.command == "sRA")) {
-      const auto why = decode_lms_scan(cola, scan_);
+    } else if (cola->name == "LMDscandata" && (cola->command == "sSN" || cola->command == "sRA")) {
+      const auto why = decode_lms_scan(*cola, scan_);
       why.empty() ? add_scan(fields, scan_) : void(fields.add("refused", why));
-    } else if (!cola.body.empty()) {
-      fields.add("body", cola.dialect == ColaDialect::ascii ? std::string(cola.text())
-                                                            : hex_text(cola.body));
+    } else if (!cola->body.empty()) {
+      const bool ascii = cola->dialect == ColaDialect::ascii;
+      fields.add("body", ascii ? std::string(cola->text()) : hex_text(cola->body));
     }
-    return message;
+    return {};
   }
 
-  TwoStreams streams_{kColaFrameMax};
-  SkippedBy refused_;
   LmsScan scan_;
 };
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "drivers/offline_fields.hpp"
+#include "drivers/offline_stream.hpp"
 #include "drivers/text.hpp"
 
 namespace drivers {
@@ -64,30 +64,23 @@ void read_block(ByteView block, const VelodynePacket& packet, std::size_t number
   }
 }
 
-class Offline : public OfflineDecoder {
- public:
-  void feed(const Captured& captured, const std::function<void(Message)>& out) override {
-    Message message{"data packet", captured.t_s, captured.from_device, {}};
+class Offline : public OfflineDatagrams {
+  std::string_view say(ByteView bytes, Message& message) override {
     Fields fields(message);
     VelodyneTelemetry telemetry;
-    const auto why = decode_velodyne(captured.bytes, packet_);
+    const auto why = decode_velodyne(bytes, packet_);
     if (why.empty()) {
+      message.name = "data packet";
       add(fields);
-    } else if (decode_velodyne_telemetry(captured.bytes, telemetry).empty()) {
-      message.name = "telemetry";
-      fields.add("timestamp_us", telemetry.timestamp_us).add("nmea", telemetry.nmea);
-      if (const Fault* state = fault_of(kPps, telemetry.pps)) fields.add("pps", state->name);
-    } else {
-      Skipped& skipped = skipped_[std::string(why)];
-      ++skipped.times;
-      skipped.bytes += captured.bytes.size();
-      return;
+      return {};
     }
-    out(std::move(message));
+    if (!decode_velodyne_telemetry(bytes, telemetry).empty()) return why;
+    message.name = "telemetry";
+    fields.add("timestamp_us", telemetry.timestamp_us).add("nmea", telemetry.nmea);
+    if (const Fault* state = fault_of(kPps, telemetry.pps)) fields.add("pps", state->name);
+    return {};
   }
-  SkippedBy skipped() const override { return skipped_; }
 
- private:
   void add(Fields& fields) const {
     std::vector<double> distance_m, azimuth_deg, reflectivity;
     for (const VelodynePoint& point : packet_.points) {
@@ -104,7 +97,6 @@ class Offline : public OfflineDecoder {
   }
 
   VelodynePacket packet_;
-  SkippedBy skipped_;
 };
 
 }  // namespace

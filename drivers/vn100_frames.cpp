@@ -2,7 +2,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "drivers/offline_fields.hpp"
+#include "drivers/offline_stream.hpp"
 #include "drivers/vn100_codec.hpp"
 
 namespace drivers {
@@ -15,46 +15,34 @@ Eigen::Quaterniond to_enu_flu(const Eigen::Quaterniond& q_ned_frd) {
   return (q_enu_ned * q_ned_frd * q_frd_flu).normalized();
 }
 
-class Offline : public OfflineDecoder {
+class Offline : public OfflineStream {
  public:
-  void feed(const Captured& captured, const std::function<void(Message)>& out) override {
-    Resync& stream = streams_.of(captured.from_device);
-    stream.feed(captured.bytes);
-    while (const auto frame = stream.next(look_vn100)) {
-      Message message{"binary", captured.t_s, captured.from_device, {}};
-      Fields fields(message);
-      if ((*frame)[0] != '$')
-        say(fields, decode_vn100_binary(*frame));
-      else if (!say_line(message, fields, *frame))
-        continue;
-      out(std::move(message));
-    }
-  }
-  SkippedBy skipped() const override {
-    SkippedBy all = streams_.skipped();
-    if (others_.times > 0) all["line of another device"] = others_;
-    return all;
-  }
+  Offline() : OfflineStream(look_vn100, kVn100FrameMax) {}
 
  private:
-  bool say_line(Message& message, Fields& fields, ByteView frame) {
+  std::string_view say(ByteView frame, Message& message) override {
+    Fields fields(message);
+    if (frame[0] == '$') return say_line(frame, message);
+    message.name = "binary";
+    say_sample(fields, decode_vn100_binary(frame));
+    return {};
+  }
+
+  static std::string_view say_line(ByteView frame, Message& message) {
     const auto line = parse_vn100_line(frame);
-    if (!line) {
-      ++others_.times;
-      others_.bytes += frame.size();
-      return false;
-    }
+    if (!line) return "line of another device";
     message.name = line->type;
+    Fields fields(message);
     if (const auto sample = vn100_sample(*line))
-      say(fields, *sample);
+      say_sample(fields, *sample);
     else
       for (const std::string& field : line->fields) fields.add("field", field);
     fields.maybe("time_ms", line->time_ms).maybe("status", line->status);
     if (const Fault* fault = vn100_error(*line)) fields.faults(std::array{fault});
-    return true;
+    return {};
   }
 
-  static void say(Fields& f, const Vn100Sample& s) {
+  static void say_sample(Fields& f, const Vn100Sample& s) {
     f.maybe("startup_ns", s.startup_ns).maybe("sync_in_ns", s.sync_in_ns);
     f.maybe("yaw_pitch_roll_deg", s.yaw_pitch_roll_deg).maybe("quaternion", s.quaternion);
     f.maybe("rate_radps", s.rate_radps).maybe("accel_mps2", s.accel_mps2);
@@ -70,9 +58,6 @@ class Offline : public OfflineDecoder {
     f.maybe("yaw_pitch_roll_sigma_deg", s.yaw_pitch_roll_sigma_deg);
     if (s.vpe_status) f.faults(vn100_faults(*s.vpe_status));
   }
-
-  TwoStreams streams_{kVn100FrameMax};
-  Skipped others_;
 };
 
 }  // namespace
