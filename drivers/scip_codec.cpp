@@ -232,8 +232,9 @@ std::string_view decode_scip_scan(const ScipReply& reply, ScipScan& into) {
   if (const auto why = read_echo(reply.echo, into); !why.empty()) return why;
   const char kind = reply.echo[1];
   if (kind != 'D' && kind != 'S' && kind != 'E') return "not a scan";
-  if (reply.lines[0].size() != 4) return "no time stamp";
-  into.time_ms = scip_decode(reply.lines[0]);
+  const auto time = reply.lines[0].size() == 4 ? scip_decode(reply.lines[0]) : std::nullopt;
+  if (!time) return "no time stamp";
+  into.time_ms = *time;
   into.intensities = kind == 'E';
   into.distances_mm.clear();
   into.intensities_raw.clear();
@@ -249,6 +250,12 @@ std::string_view decode_scip_scan(const ScipReply& reply, ScipScan& into) {
   if (into.distances_mm.size() != expected) return "number of beams";
   if (into.intensities && into.intensities_raw.size() != expected) return "number of beams";
   return {};
+}
+
+std::optional<std::uint32_t> scip_time_ms(const ScipReply& reply) {
+  if (reply.echo != "TM1" || reply.status != "00") return std::nullopt;
+  if (reply.lines.size() != 1 || reply.lines[0].size() != 4) return std::nullopt;
+  return scip_decode(reply.lines[0]);
 }
 
 double scip_angle_rad(const ScipParameters& parameters, const ScipScan& scan, std::size_t beam) {
@@ -275,9 +282,13 @@ const Fault* scip_urg_distance(std::uint32_t distance_mm) {
   return distance_mm >= 16 && distance_mm <= 19 ? &kReflection : nullptr;
 }
 
-std::uint32_t scip_decode(std::string_view characters) {
+std::optional<std::uint32_t> scip_decode(std::string_view characters) {
   std::uint32_t value = 0;
-  for (const char c : characters) value = value << 6 | (static_cast<std::uint8_t>(c - 0x30) & 63U);
+  for (const char c : characters) {
+    const auto bits = static_cast<std::uint8_t>(c - 0x30);
+    if (bits > 63) return std::nullopt;
+    value = value << 6 | bits;
+  }
   return value;
 }
 

@@ -56,6 +56,9 @@ struct ScipScan {
 // MD, MS, ME, GD, GS and GE replies with data. Empty, or what is wrong.
 std::string_view decode_scip_scan(const ScipReply& reply, ScipScan& into);
 
+// The clock that TM1 answers with, of 24 bits like a scan's.
+std::optional<std::uint32_t> scip_time_ms(const ScipReply& reply);
+
 // REP-103: counter-clockwise, 0 is the front.
 double scip_angle_rad(const ScipParameters& parameters, const ScipScan& scan, std::size_t beam);
 // Only what lies within the device's limits is a range.
@@ -63,7 +66,8 @@ bool scip_is_range(const ScipParameters& parameters, std::uint32_t distance_mm);
 // What the URG-04LX says with a distance below its least: by code, null where it is a range.
 const Fault* scip_urg_distance(std::uint32_t distance_mm);
 
-std::uint32_t scip_decode(std::string_view characters);
+// Six bits a character, most significant first; nothing where one cannot be.
+std::optional<std::uint32_t> scip_decode(std::string_view characters);
 Bytes scip_request(std::string_view command);
 // MD (3 characters a distance), or ME with intensities. `scans` 0: endless.
 Bytes scip_stream_request(bool intensities, int step_first, int step_last, int group, int skip,

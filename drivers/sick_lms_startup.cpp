@@ -108,7 +108,7 @@ std::string lms_settings_problem(const LmsSettings& s) {
 
 std::vector<LmsStep> lms_startup(ColaDialect dialect, const LmsSettings& settings) {
   Dialogue talk(dialect);
-  talk.ask("log in", "sMN", "SetAccessMode", {{As::u8, 3}, {As::hex32, 0xF4724744}});
+  talk.ask("log in", "sMN", "SetAccessMode", {{As::u8, 3}, {As::hex32, settings.password}});
   talk.expect(1);
   talk.ask("choose the dialect", "sWN", "EIHstCola", {{As::u8, dialect == ColaDialect::binary}});
   identify(talk);

@@ -18,6 +18,7 @@ struct LmsSettings {
   std::int32_t start_1e4deg = -450000;  // Device angles: 90 degrees is straight ahead.
   std::int32_t stop_1e4deg = 2250000;
   std::uint16_t every_nth_scan = 1;
+  std::uint32_t password = 0xF4724744;  // Of the authorised client; 0x6FD62C05 on safety TiMs.
 };
 
 // Empty, or why no such scanner has these settings, with what it has.

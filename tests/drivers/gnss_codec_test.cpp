@@ -151,6 +151,40 @@ TEST(Gnss, HeadingLogAgreesWithGpsd) {
   EXPECT_EQ(fixes, 21U);  // Sentences GGA with a quality above 0.
 }
 
+TEST(Gnss, PositionsOfLogsWithoutDatesAgreeWithGpsd) {
+  for (const auto& [name, count] : {std::pair{"gnss/hemi.log", 6U}, {"gnss/tcp-torture.log", 3U}}) {
+    RECORDING_OR_SKIP(log, name);
+    RECORDING_OR_SKIP(chk, std::string(name) + ".chk");
+    std::string stream = without_comments(log);
+    std::erase(stream, '|');  // Where the segments end.
+    const auto epochs = nmea_epochs(stream);
+    // There gpsd's last word is RMC's, of four decimals of a minute.
+    const double most_deg = count == 3 ? 0.51e-4 / 60 : 0.51e-9;
+    std::size_t compared = 0;
+    for (const GpsdTpv& tpv : gpsd_messages<GpsdTpv>(chk)) {
+      if (!tpv.latitude_deg) continue;
+      ++compared;
+      EXPECT_TRUE(
+          std::any_of(epochs.begin(), epochs.end(),
+                      [&](const GnssEpoch& epoch) {
+                        return epoch.usable() &&
+                               std::abs(epoch.latitude->deg() - *tpv.latitude_deg) < most_deg &&
+                               std::abs(epoch.longitude->deg() - *tpv.longitude_deg) < most_deg;
+                      }))
+          << name << ' ' << *tpv.latitude_deg;
+    }
+    EXPECT_EQ(compared, count);
+  }
+}
+
+TEST(Gpsd, LinesOfOthersPassThroughByName) {
+  RECORDING_OR_SKIP(log, "gnss/passthrough.log");
+  std::vector<std::string> names;
+  for (const auto& other : gpsd_messages<GpsdOther>(without_comments(log)))
+    names.push_back(other.name);
+  EXPECT_EQ(names, (std::vector<std::string>{"XXX", "YYY", "ZZZ"}));
+}
+
 TEST(Gnss, M8nMessagesAgreeWithGpsd) {
   RECORDING_OR_SKIP(log, "gnss/ublox-neo-m8n.log");
   RECORDING_OR_SKIP(chk, "gnss/ublox-neo-m8n.log.chk");

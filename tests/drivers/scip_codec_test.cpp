@@ -132,6 +132,31 @@ TEST(Scip, ScansThatDoNotHoldTheirBeamsAreRefused) {
   EXPECT_EQ(refuse("MD0000000201000", ""), "no data");
 }
 
+TEST(Scip, NoFlippedByteGivesOtherDistances) {
+  const Bytes frame = scan_reply("MD0000000301000", "99", 7, encoded({900, 2, 3, 4}, 3));
+  ScipReply reply;
+  ScipScan scan;
+  for (std::size_t at = 16; at < frame.size(); ++at)  // The echo has no checksum.
+    for (int bit = 0; bit < 8; ++bit) {
+      Bytes bad = frame;
+      bad[at] = static_cast<std::uint8_t>(bad[at] ^ (1 << bit));
+      for (const Bytes& got : frames_in(bad, look_scip, kScipFrameMax)) {
+        ASSERT_EQ(parse_scip(got, reply), "");
+        EXPECT_NE(decode_scip_scan(reply, scan), "") << at << ' ' << bit;
+      }
+    }
+}
+
+TEST(Scip, TheClockIsReadFromTm1) {
+  const Bytes frame = bytes_of("TM1\n" + checked("00") + checked(encoded({0x123456}, 4)) + "\n");
+  ScipReply reply;
+  ASSERT_EQ(frames_in(frame, look_scip, kScipFrameMax), std::vector<Bytes>{frame});
+  ASSERT_EQ(parse_scip(frame, reply), "");
+  EXPECT_EQ(scip_time_ms(reply), 0x123456U);
+  reply.echo = "TM0";
+  EXPECT_FALSE(scip_time_ms(reply));
+}
+
 TEST(Scip, AnglesAreRep103) {
   ScipParameters parameters;
   parameters.steps_per_turn = 1440;
