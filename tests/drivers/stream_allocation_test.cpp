@@ -1,31 +1,10 @@
 // Streams decoded into reused values allocate nothing once they have seen their largest message.
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cstdlib>
-#include <new>
-
 #include "drivers/ouster_codec.hpp"
 #include "drivers/sick_lms_codec.hpp"
 #include "drivers/velodyne_codec.hpp"
-
-namespace {
-
-std::atomic<std::uint64_t> allocations{0};
-
-}  // namespace
-
-void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size == 0 ? 1 : size)) return memory;
-  throw std::bad_alloc();
-}
-void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
+#include "tests/drivers/allocations.hpp"
 
 namespace drivers {
 namespace {
@@ -34,16 +13,16 @@ namespace {
 template <class Call>
 std::uint64_t allocations_of(Call&& call) {
   for (int i = 0; i < 3; ++i) call();
-  const std::uint64_t before = allocations;
+  const std::uint64_t before = drivers_test::allocations();
   for (int i = 0; i < 100; ++i) call();
-  return allocations - before;
+  return drivers_test::allocations() - before;
 }
 
-TEST(Allocation, IsCounted) {
+TEST(StreamAllocation, IsCounted) {
   EXPECT_EQ(allocations_of([] { ::operator delete(::operator new(8)); }), 100U);
 }
 
-TEST(Allocation, ScansOfBothDialectsAllocateNothing) {
+TEST(StreamAllocation, ScansOfBothDialectsAllocateNothing) {
   LmsScan made;
   made.encoders.resize(1);
   made.channels16 = {
@@ -64,7 +43,7 @@ TEST(Allocation, ScansOfBothDialectsAllocateNothing) {
   }
 }
 
-TEST(Allocation, PacketsAllocateNothing) {
+TEST(StreamAllocation, PacketsAllocateNothing) {
   OusterMetadata metadata;
   metadata.rows = 32;
   metadata.columns_per_frame = 1024;
