@@ -242,7 +242,7 @@ class GnssOffline : public OfflineStream {
 std::string_view say_gpsd(Message& out, ByteView line) {
   constexpr const char* kNames[] = {"", "TPV", "SKY", "GST", "ATT", "VERSION", "ERROR"};
   const auto parsed = parse_gpsd(line);
-  if (!parsed) return "no JSON object";
+  if (!parsed) return "no class";
   const auto* other = std::get_if<GpsdOther>(&*parsed);
   out.name = other != nullptr ? other->name : kNames[parsed->index()];
   Fields fields(out);

@@ -15,6 +15,16 @@ namespace {
 
 namespace json = boost::json;
 
+// Null where the text is no JSON.
+json::value parse_object(std::string_view text, json::monotonic_resource* resource) {
+  json::error_code error;
+  json::parse_options options;
+  options.max_depth = 8;
+  json::value value =
+      json::parse(json::string_view(text.data(), text.size()), error, resource, options);
+  return error ? json::value() : value;
+}
+
 class Keys {
  public:
   explicit Keys(const json::object& object) : object_(object) {}
@@ -173,20 +183,26 @@ std::optional<double> sigma(std::optional<double> p95) {
 Look look_gpsd(ByteView front) {
   const auto line_end = std::find(front.begin(), front.end(), '\n');
   const auto size = static_cast<std::size_t>(line_end - front.begin());
-  if (front[0] != '{') return Look::none("no JSON", std::min(size + 1, front.size()));
-  return line_end == front.end() ? Look::more() : Look::frame(size + 1);
+  if (front[0] != '{') {
+    const auto next = std::find(front.begin(), line_end, '{');
+    const auto skip = static_cast<std::size_t>(next - front.begin());
+    return Look::none("no JSON", std::min(skip == size ? size + 1 : skip, front.size()));
+  }
+  if (line_end == front.end()) return Look::more();
+  unsigned char memory[8192];
+  json::monotonic_resource resource(memory, sizeof memory);
+  const std::string_view line = as_text(front.first(size));
+  if (parse_object(line, &resource).is_object()) return Look::frame(size + 1);
+  // A line that was cut, and the next one run into it.
+  const auto inner = line.find("{\"class\":", 1);
+  return Look::none("no JSON object", inner == std::string_view::npos ? size + 1 : inner);
 }
 
 std::optional<GpsdMessage> parse_gpsd(ByteView line) {
-  json::error_code error;
-  const std::string_view text = as_text(line);
-  json::parse_options options;
-  options.max_depth = 8;
   unsigned char memory[8192];
   json::monotonic_resource resource(memory, sizeof memory);
-  const json::value value =
-      json::parse(json::string_view(text.data(), text.size()), error, &resource, options);
-  if (error || !value.is_object()) return std::nullopt;
+  const json::value value = parse_object(as_text(line), &resource);
+  if (!value.is_object()) return std::nullopt;
   const Keys keys(value.get_object());
   const std::string name = keys.text("class");
   return name.empty() ? std::nullopt : std::optional(read_message(name, keys));

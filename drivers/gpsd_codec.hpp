@@ -19,7 +19,7 @@ inline constexpr std::size_t kGpsdLineMax = 64 * 1024;
 // What a client sends first.
 inline constexpr std::string_view kGpsdWatch = "?WATCH={\"enable\":true,\"json\":true};\r\n";
 
-// For Resync: lines that begin with '{'.
+// For Resync: lines that are a JSON object.
 Look look_gpsd(ByteView front);
 
 struct GpsdTpv {
@@ -68,7 +68,7 @@ struct GpsdOther {
 using GpsdMessage =
     std::variant<GpsdOther, GpsdTpv, GpsdSky, GpsdGst, GpsdAtt, GpsdVersion, GpsdError>;
 
-// Nothing where the line is no JSON object with a class.
+// Nothing where the line has no class.
 std::optional<GpsdMessage> parse_gpsd(ByteView line);
 
 GnssEpoch epoch_of(const GpsdTpv& tpv);

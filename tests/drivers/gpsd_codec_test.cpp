@@ -59,7 +59,21 @@ TEST(Gpsd, OtherLinesAreNamedAndBadOnesCounted) {
   decoder->feed(captured, [&](const Message& m) { names.push_back(m.name); });
   EXPECT_EQ(names, (std::vector<std::string>{"VERSION", "SKY", "WATCH", "ERROR"}));
   EXPECT_EQ(decoder->skipped().at("no JSON").bytes, 14U);
-  EXPECT_EQ(decoder->skipped().at("no JSON object").times, 2U);
+  EXPECT_EQ(decoder->skipped().at("no JSON object").bytes, 12U);
+  EXPECT_EQ(decoder->skipped().at("no class").times, 1U);
+}
+
+TEST(Gpsd, WholeLinesSurviveDamage) {
+  const auto line = [](std::string_view text) {
+    return drivers_test::bytes_of(std::string(text) + "\r\n");
+  };
+  const std::vector<Bytes> frames{
+      line(R"({"class":"TPV","mode":3,"lat":41.5})"),
+      line(R"({"class":"DEVICES","devices":[{"class":"DEVICE","path":"/dev/ttyACM0"}]})"),
+      line(R"({"class":"SKY","satellites":[{"PRN":5,"used":true}]})"),
+      line(R"({"class":"WATCH"})")};
+  drivers_test::expect_whole_frames_survive(frames, look_gpsd, kGpsdLineMax,
+                                            drivers_test::bytes_of("x{\"class\":{{\x02$"));
 }
 
 }  // namespace
