@@ -198,7 +198,7 @@ std::optional<ScipInfo> scip_info(const ScipReply& reply) {
   ScipInfo info;
   for (std::string_view line : reply.lines) {
     const auto colon = line.find(':');
-    if (colon == std::string_view::npos || !line.ends_with(';')) return std::nullopt;
+    if (colon == std::string_view::npos || colon == 0 || !line.ends_with(';')) return std::nullopt;
     info.emplace_back(line.substr(0, colon), line.substr(colon + 1, line.size() - colon - 2));
   }
   return info;

@@ -68,6 +68,19 @@ TEST(Scip, RealRepliesAreReadWhole) {
   EXPECT_EQ(scip_fault(reply), nullptr);  // Lit already.
 }
 
+TEST(Scip, LinesWithoutAKeyAreNoInformation) {
+  ScipReply reply;
+  reply.echo = "PP";
+  reply.status = "00";
+  for (const char* line : {":60000;", "DMAX60000;", "DMAX:60000"}) {
+    reply.lines = {line};
+    EXPECT_FALSE(scip_info(reply)) << line;
+  }
+  ScipParameters parameters;
+  EXPECT_EQ(scip_parameters({{"DMIN", "x"}}, parameters), "DMIN is missing or no number");
+  EXPECT_EQ(scip_parameters({{"DMIN", "20"}}, parameters), "DMAX is missing or no number");
+}
+
 TEST(Scip, ARealScanOfOneStepIsReadWhole) {
   RECORDING_OR_SKIP(text, "hokuyo/urg04lx_MD_one_step.scip");
   const auto frames = frames_in(as_bytes(text), look_scip, kScipFrameMax);
