@@ -14,8 +14,8 @@ namespace {
 bool printable(std::uint8_t byte) {
   return byte >= 0x20 && byte <= 0x7E;
 }
-bool upper(std::uint8_t byte) {
-  return byte >= 'A' && byte <= 'Z';
+bool starts_echo(std::uint8_t byte) {
+  return (byte >= 'A' && byte <= 'Z') || byte == '%';
 }
 
 bool status_line(std::string_view line) {
@@ -159,8 +159,8 @@ char scip_checksum(std::string_view line) {
 }
 
 Look look_scip(ByteView front) {
-  if (!upper(front[0]) && front[0] != '%') {
-    const auto next = std::find_if(front.begin(), front.end(), upper);
+  if (!starts_echo(front[0])) {
+    const auto next = std::find_if(front.begin(), front.end(), starts_echo);
     return Look::none("no echo", static_cast<std::size_t>(next - front.begin()));
   }
   std::size_t lines = 0, begin = 0;
