@@ -1,26 +1,15 @@
 // Links carry frames and bytes. Drivers use them; nothing above drivers/ does.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "hal/frames.hpp"
 #include "hal/task.hpp"
 #include "hal/values.hpp"
 
 namespace hal {
-
-// One classical CAN data or remote frame.
-struct CanFrame {
-  std::uint32_t id{};  // 11 bits, or 29 where extended.
-  std::uint8_t size{};
-  std::array<std::uint8_t, 8> data{};
-  bool extended{};
-  bool remote{};  // Asks for the frame of this id; has no data.
-
-  bool operator==(const CanFrame&) const = default;
-};
 
 // Times are arrival times by the robot's clock, as early as the link can tell.
 struct ReceivedFrame {
@@ -64,10 +53,7 @@ class Datagrams {
 // Modbus: 16-bit registers and coils of one unit.
 class Registers {
  public:
-  struct Range {
-    std::uint16_t first{};
-    std::uint16_t count{};
-  };
+  using Range = RegisterRange;
   virtual ~Registers() = default;
   virtual Task<Result<std::vector<std::uint16_t>>> read_input(Range range) = 0;
   virtual Task<Result<std::vector<std::uint16_t>>> read_holding(Range range) = 0;
