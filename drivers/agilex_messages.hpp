@@ -8,7 +8,8 @@
 #include <cstdint>
 #include <variant>
 
-#include "drivers/faults.hpp"
+#include "drivers/fault.hpp"
+#include "drivers/unread.hpp"
 
 namespace drivers::agilex {
 

@@ -8,7 +8,8 @@
 #include <variant>
 
 #include "drivers/bytes.hpp"
-#include "drivers/faults.hpp"
+#include "drivers/fault.hpp"
+#include "drivers/unread.hpp"
 #include "hal/frames.hpp"
 
 namespace drivers::canopen {

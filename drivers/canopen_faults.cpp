@@ -107,7 +107,7 @@ constexpr Fault kErrorRegister[] = {
 
 Fault abort_fault(std::uint32_t code) {
   const auto* found = std::find_if(std::begin(kAborts), std::end(kAborts),
-                                   [&](const Fault& fault) { return fault.code == code; });
+                                   [&](const Fault& fault) { return fault.value == code; });
   if (found != std::end(kAborts)) return *found;
   return {code, "unknown abort code", "not in CiA 301: the maker's own", "see the drive's manual"};
 }
@@ -115,9 +115,9 @@ Fault abort_fault(std::uint32_t code) {
 Fault emergency_fault(std::uint16_t code) {
   const auto* found =
       std::find_if(std::begin(kEmergencies), std::end(kEmergencies),
-                   [&](const Class& known) { return (code & known.mask) == known.fault.code; });
+                   [&](const Class& known) { return (code & known.mask) == known.fault.value; });
   Fault fault = found->fault;
-  fault.code = code;
+  fault.value = code;
   return fault;
 }
 

@@ -9,7 +9,8 @@
 #include <vector>
 
 #include "drivers/bytes.hpp"
-#include "drivers/faults.hpp"
+#include "drivers/fault.hpp"
+#include "drivers/unread.hpp"
 #include "hal/frames.hpp"
 
 namespace drivers::gs_usb {

@@ -201,7 +201,7 @@ Bytes encode_pdu(const Pdu& pdu) {
 
 Fault exception_fault(std::uint8_t code) {
   const auto* found = std::find_if(std::begin(kExceptions), std::end(kExceptions),
-                                   [&](const Fault& fault) { return fault.code == code; });
+                                   [&](const Fault& fault) { return fault.value == code; });
   if (found != std::end(kExceptions)) return *found;
   return {code, "unknown exception", "not in the Modbus standard", "see the device's manual"};
 }

@@ -8,7 +8,8 @@
 #include <vector>
 
 #include "drivers/bytes.hpp"
-#include "drivers/faults.hpp"
+#include "drivers/fault.hpp"
+#include "drivers/unread.hpp"
 #include "drivers/resync.hpp"
 
 namespace drivers::modbus {

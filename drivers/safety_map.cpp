@@ -24,9 +24,9 @@ std::optional<PilzStatus> pilz_status(const std::vector<bool>& bits) {
   return PilzStatus{bits[0], bits[1], bits[2]};
 }
 
-std::vector<Fault> pilz_faults(std::uint16_t leds) {
-  std::vector<Fault> faults = faults_in(kLamps, leds);
-  if ((leds & kRun) == 0) faults.push_back(kNotRunning);
+std::vector<const Fault*> pilz_faults(std::uint16_t leds) {
+  std::vector<const Fault*> faults = faults_set(kLamps, leds);
+  if ((leds & kRun) == 0) faults.push_back(&kNotRunning);
   return faults;
 }
 

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "drivers/faults.hpp"
+#include "drivers/fault.hpp"
 #include "hal/frames.hpp"
 #include "hal/values.hpp"
 
@@ -31,7 +31,7 @@ struct PilzStatus {
 // Nothing for a reply of another length.
 std::optional<PilzStatus> pilz_status(const std::vector<bool>& bits);
 // Of register 520: what its lamps say is wrong. RUN that is off is one of them.
-std::vector<Fault> pilz_faults(std::uint16_t leds);
+std::vector<const Fault*> pilz_faults(std::uint16_t leds);
 
 // --- Two contacts on inputs.
 

@@ -130,8 +130,8 @@ void take(Battery& battery, std::span<const std::uint16_t> image, std::uint16_t 
 std::vector<Alarm> alarms_in(std::span<const std::uint16_t> image, std::uint16_t image_first) {
   std::vector<Alarm> alarms;
   for (const Fault& fault : kAlarms) {
-    const auto word = word_at(image, image_first, static_cast<std::uint16_t>(fault.code));
-    if (word == 1 || word == 2) alarms.push_back({fault, word == 2});
+    const auto word = word_at(image, image_first, static_cast<std::uint16_t>(fault.value));
+    if (word == 1 || word == 2) alarms.push_back({&fault, word == 2});
   }
   return alarms;
 }

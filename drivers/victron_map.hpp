@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "drivers/faults.hpp"
+#include "drivers/fault.hpp"
 #include "hal/frames.hpp"
 
 namespace drivers::victron {
@@ -57,8 +57,8 @@ struct Battery {  // A battery service.
 void take(Battery& battery, std::span<const std::uint16_t> image, std::uint16_t image_first);
 
 struct Alarm {
-  Fault fault;    // Its code is the register.
-  bool severe{};  // Else a warning.
+  const Fault* fault{};  // Its value is the register.
+  bool severe{};         // Else a warning.
 };
 // The alarms that are set in the image.
 std::vector<Alarm> alarms_in(std::span<const std::uint16_t> image, std::uint16_t image_first);

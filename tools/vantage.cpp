@@ -9,6 +9,7 @@
 #include "mission/config_schema.hpp"
 #include "mission/json_text.hpp"
 #include "tools/vantage_cover.hpp"
+#include "tools/vantage_decode.hpp"
 #include "tools/vantage_tour.hpp"
 
 namespace {
@@ -65,7 +66,8 @@ int main(int argc, char** argv) {
       "  vantage tour pcb442.tsp --json\n"
       "  vantage cover configs/missions/fort.toml\n"
       "  vantage keys | less\n"
-      "Exit: 0 fine, 2 not fine (every reason is on stderr, one a line).");
+      "  vantage decode agilex drive.log\n"
+      "Exit: 0 fine, 1 nothing found, 2 not fine (every reason is on stderr, one a line).");
   app.require_subcommand(1);
 
   CheckOptions options;
@@ -84,6 +86,7 @@ int main(int argc, char** argv) {
       app.add_subcommand("keys", "Prints every key with its range, default and meaning (Markdown)");
   std::function<int()> run;
   vantage::add_tour_command(app, run);
+  vantage::add_decode_command(app, run);
 
   try {
     app.parse(argc, argv);
