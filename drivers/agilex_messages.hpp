@@ -96,7 +96,7 @@ struct MotorFast {       // 0x251..0x254
   std::uint8_t motor{};  // 1 front right, 2 front left, 3 rear left, 4 rear right on a Scout.
   std::int16_t speed_rpm{};
   double current_a{};
-  std::int32_t position_pulses{};
+  std::int32_t position_pulses{};  // A Hunter SE counts in the lower 24 bits only.
   bool operator==(const MotorFast&) const = default;
 };
 struct MotorSlow {  // 0x261..0x264

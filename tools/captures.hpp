@@ -42,8 +42,8 @@ struct Capture {
 
 struct Options {
   Format format = Format::detect;
-  bool swap_sides = false;            // The device is the other side.
-  std::optional<std::uint16_t> port;  // Only UDP and TCP with this port.
+  bool swap_sides = false;              // The device is the other side.
+  std::optional<std::uint16_t> port{};  // Only UDP and TCP with this port.
 };
 
 struct Error {
