@@ -10,6 +10,7 @@ namespace drivers::eds {
 namespace {
 
 constexpr unsigned kBaudRates[]{10, 20, 50, 125, 250, 500, 800, 1000};
+constexpr std::size_t kNotesMax = 50;
 constexpr std::uint8_t kArray = 8, kRecord = 9, kVariable = 7;
 
 struct TypeFact {
@@ -148,10 +149,35 @@ class Parser {
     const bool is_variable = entry.object_type == kVariable;
     if (is_variable && section.find("datatype") == nullptr)
       text_.refuse(section.line, "DataType", "", "give the variable a data type");
+    add_compact_parts(at->first.index, name, section, entry);
     if (at->second)
       description_.parts.emplace(at->first, std::move(entry));
     else
       description_.objects.emplace(at->first.index, std::move(entry));
+  }
+
+  // CompactSubObj=N: an array whose N parts are all alike and are described with the array. They
+  // may have names in [XXXXName].
+  void add_compact_parts(std::uint16_t index, const std::string& name, const Section& section,
+                         const Entry& array) {
+    const auto count = plain(section, "compactsubobj", "CompactSubObj", 0, 254).value_or(0);
+    if (count == 0) return;
+    const Section* names = text_.find(name + "name");
+    Entry part = array;
+    part.object_type = kVariable;
+    for (std::int64_t i = 1; i <= count; ++i) {
+      const Value* named = names == nullptr ? nullptr : given(*names, std::to_string(i));
+      part.name = named != nullptr ? named->text : array.name + std::to_string(i);
+      description_.parts.emplace(canopen::Address{index, static_cast<std::uint8_t>(i)}, part);
+    }
+    Entry entries;
+    entries.name = "Number of entries";
+    entries.data_type = static_cast<std::uint16_t>(Type::uint8);
+    entries.access = Access::read_only;
+    entries.default_value = Number{count, false};
+    entries.default_text = std::to_string(count);
+    entries.line = array.line;
+    description_.parts.emplace(canopen::Address{index, 0}, entries);
   }
 
   void read_access(const Section& section, Entry& entry) {
@@ -188,14 +214,18 @@ class Parser {
     for (std::int64_t i = 1; i <= count; ++i) {
       const auto key = std::to_string(i);
       const auto index = plain(*list, key, key.c_str(), 1, 0xFFFF);
-      if (list->find(key) == nullptr) {
-        text_.refuse(list->line, key, "", "list as many objects as SupportedObjects says");
-        return;
-      }
+      const Value* listed = list->find(key);
+      if (listed == nullptr)
+        return note(
+            {text_.file(), list->line, key, "", "list as many objects as SupportedObjects says"});
       if (index && !description_.objects.contains(static_cast<std::uint16_t>(*index)))
-        text_.refuse(list->find(key)->line, key, list->find(key)->text,
-                     "describe the object in a section of that name");
+        note({text_.file(), listed->line, key, listed->text,
+              "describe the object in a section of that name"});
     }
+  }
+
+  void note(Error error) {
+    if (description_.notes.size() < kNotesMax) description_.notes.push_back(std::move(error));
   }
 
   void check_parts() {

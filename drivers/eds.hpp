@@ -95,13 +95,15 @@ struct Description {
   std::optional<unsigned> node_baud_kbps;  // DCF only.
   std::map<std::uint16_t, Entry> objects;
   std::map<canopen::Address, Entry, Order> parts;  // Of arrays and records, [1018sub1].
+  // What is wrong but does not matter here: lists of objects that do not fit the objects.
+  std::vector<Error> notes;
 
   // The variable there: an object itself for sub-index 0 of a plain variable, else a part.
   const Entry* find(canopen::Address at) const;
 };
 
 // Reads the text. Unknown sections and keys are passed over, as CiA 306 asks; what a device needs
-// to be used is checked: numbers, types, that listed objects are there. `file` is for messages.
+// to be used is checked: numbers, types, parts without their whole. `file` is for messages.
 Result<Description> parse(std::string_view text, std::string_view file);
 
 }  // namespace drivers::eds

@@ -28,6 +28,7 @@ class Text {
 
   const std::map<std::string, Section>& sections() const { return sections_; }
   const Section* find(const std::string& name) const;
+  const std::string& file() const { return file_; }
 
   // Collects what is wrong, up to a bound.
   void refuse(int line, std::string field, std::string value, std::string remedy);
