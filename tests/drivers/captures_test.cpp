@@ -395,7 +395,8 @@ TEST(Decode, ReadsTheScannerRecordings) {
   drivers::SkippedBy skipped;
   const auto lms = must_read(json);
   EXPECT_EQ(lms.format, Format::json);
-  EXPECT_EQ(decoded(lms, "sick-lms", skipped).at("LMDscandata"), 175);
+  EXPECT_EQ(decoded(lms, "sick-lms", skipped).at("LMDscandata"),
+            2 + 175);  // Subscription, its answer, scans.
   const auto tim = must_read(pcapng_file);
   EXPECT_EQ(tim.format, Format::pcap);
   EXPECT_FALSE(tim.pieces.empty());
