@@ -408,6 +408,20 @@ TEST(Decode, ReadsTheScannerRecordings) {
   EXPECT_EQ(must_read(velodyne).pieces[0].bytes.size(), 1212U);
 }
 
+TEST(Decode, KeepsConversationsApart) {
+  // Replies of two gateways, each cut in two, one between the other's halves.
+  const auto part = [](std::uint8_t from, std::uint32_t sequence, const char* hex) {
+    return ip(6, from, 9, tcp(502, 50000, sequence, 16, as_string(from_hex(hex))));
+  };
+  const auto capture =
+      must_read(pcap({part(1, 10, "0001 0000 0005 64"), part(2, 90, "0001 0000 0005 E1 03 02"),
+                      part(1, 17, "03 02 000A"), part(2, 99, "000B")}));
+  EXPECT_EQ(capture.conversations.size(), 2U);
+  drivers::SkippedBy skipped;
+  EXPECT_EQ(decoded(capture, "modbus", skipped),
+            (std::map<std::string, int>{{"read holding registers", 2}}));
+}
+
 TEST(Decode, KnowsItsDevices) {
   for (const auto& device : decoders::devices()) {
     if (device.needs_metadata) continue;
