@@ -68,10 +68,7 @@ class Offline : public OfflineDecoder {
 
   SkippedBy skipped() const override {
     SkippedBy all = (kind_ == Kind::tcp ? tcp_ : rtu_).skipped();
-    for (const auto& [why, by] : skipped_) {
-      all[why].times += by.times;
-      all[why].bytes += by.bytes;
-    }
+    add(all, skipped_);
     return all;
   }
 

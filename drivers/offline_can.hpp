@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <optional>
-#include <string_view>
 
 #include "drivers/offline_fields.hpp"
 #include "hal/frames.hpp"
@@ -20,12 +19,6 @@ inline std::optional<hal::CanFrame> can_frame(const Captured& captured) {
   frame.remote = captured.can_remote;
   std::copy(captured.bytes.begin(), captured.bytes.end(), frame.data.begin());
   return frame;
-}
-
-inline void skip(SkippedBy& skipped, std::string_view why, std::size_t bytes) {
-  Skipped& by = skipped[std::string(why)];
-  ++by.times;
-  by.bytes += bytes;
 }
 
 }  // namespace drivers

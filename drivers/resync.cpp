@@ -4,6 +4,19 @@
 
 namespace drivers {
 
+void skip(SkippedBy& skipped, std::string_view why, std::size_t bytes) {
+  Skipped& by = skipped[std::string(why)];
+  ++by.times;
+  by.bytes += bytes;
+}
+
+void add(SkippedBy& all, const SkippedBy& more) {
+  for (const auto& [why, by] : more) {
+    all[why].times += by.times;
+    all[why].bytes += by.bytes;
+  }
+}
+
 void Resync::feed(ByteView bytes) {
   buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(begin_));
   begin_ = 0;

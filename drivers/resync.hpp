@@ -34,6 +34,8 @@ struct Skipped {
   std::uint64_t bytes{};
 };
 using SkippedBy = std::map<std::string, Skipped, std::less<>>;
+void skip(SkippedBy& skipped, std::string_view why, std::size_t bytes);
+void add(SkippedBy& all, const SkippedBy& more);
 
 class Resync {
  public:

@@ -98,9 +98,7 @@ void Builder::add(Piece piece) {
 }
 
 void Builder::skip(std::string_view why, std::size_t bytes) {
-  drivers::Skipped& by = capture_.skipped[std::string(why)];
-  ++by.times;
-  by.bytes += bytes;
+  drivers::skip(capture_.skipped, why, bytes);
 }
 
 std::string_view take_line(std::string_view& rest) {

@@ -33,13 +33,6 @@ std::string file_text(const std::filesystem::path& path) {
   return std::move(*read);
 }
 
-void add_to(drivers::SkippedBy& all, const drivers::SkippedBy& more) {
-  for (const auto& [why, by] : more) {
-    all[why].times += by.times;
-    all[why].bytes += by.bytes;
-  }
-}
-
 std::string device_names() {
   std::string names;
   for (const auto& device : decoders::devices())
@@ -81,7 +74,7 @@ class Decoders {
     return *decoder;
   }
   void add_skipped(drivers::SkippedBy& all) const {
-    for (const auto& [conversation, decoder] : decoders_) add_to(all, decoder->skipped());
+    for (const auto& [conversation, decoder] : decoders_) drivers::add(all, decoder->skipped());
   }
 
  private:
