@@ -55,10 +55,7 @@ class TwoStreams {
   Resync& of(bool from_device) { return from_device ? from_ : to_; }
   SkippedBy skipped() const {
     SkippedBy all = from_.skipped();
-    for (const auto& [why, skipped] : to_.skipped()) {
-      all[why].times += skipped.times;
-      all[why].bytes += skipped.bytes;
-    }
+    drivers::add(all, to_.skipped());
     return all;
   }
 

@@ -1,21 +1,15 @@
 #include "drivers/offline_stream.hpp"
 
-#include <string>
 #include <utility>
 
 namespace drivers {
 
 void Refusals::add(std::string_view why, std::size_t size) {
-  Skipped& refused = refused_[std::string(why)];
-  ++refused.times;
-  refused.bytes += size;
+  drivers::skip(refused_, why, size);
 }
 
 SkippedBy Refusals::with(SkippedBy skipped) const {
-  for (const auto& [why, refused] : refused_) {
-    skipped[why].times += refused.times;
-    skipped[why].bytes += refused.bytes;
-  }
+  drivers::add(skipped, refused_);
   return skipped;
 }
 

@@ -408,6 +408,33 @@ TEST(Decode, ReadsTheScannerRecordings) {
   EXPECT_EQ(must_read(velodyne).pieces[0].bytes.size(), 1212U);
 }
 
+TEST(Decode, ReadsARecordingOfEveryOtherDevice) {
+  const std::pair<const char*, const char*> files[] = {
+      {"nmea", "gnss/nmea-rtk.log"},
+      {"ublox", "gnss/ublox-neo-m8n.log"},
+      {"gpsd", "gnss/nmea-rtk.log.chk"},
+      {"hokuyo", "hokuyo/urg04lx_MD_one_step.scip"},
+      {"ptu", "ptu/transcripts.txt"},
+      {"vn100", "vn100/F00294"},
+      {"modbus", "modbus/pymodbus_rtu_mbpoll.socat_hex.txt"}};
+  for (const auto& [device, file] : files) {
+    RECORDING_OR_SKIP(text, file);
+    drivers::SkippedBy skipped;
+    EXPECT_FALSE(decoded(must_read(text), device, skipped).empty()) << device << " " << file;
+  }
+  RECORDING_OR_SKIP(pcap_file, "ouster/OS-1-32-G_v2.1.1_1024x10.pcap");
+  RECORDING_OR_SKIP(metadata, "ouster/OS-1-32-G_v2.1.1_1024x10.json");
+  const auto decoder = decoders::make_decoder("ouster", {metadata});
+  std::map<std::string, int> names;
+  const auto capture = must_read(pcap_file);
+  for (const auto& piece : capture.pieces)
+    decoder->feed({piece.t_s, piece.from_device, piece.bytes},
+                  [&](const drivers::Message& message) { ++names[message.name]; });
+  EXPECT_EQ(static_cast<std::size_t>(names["lidar packet"] + names["IMU packet"]),
+            capture.pieces.size());
+  EXPECT_THROW(decoders::make_decoder("ouster", {"no json"}), std::runtime_error);
+}
+
 TEST(Decode, KeepsConversationsApart) {
   // Replies of two gateways, each cut in two, one between the other's halves.
   const auto part = [](std::uint8_t from, std::uint32_t sequence, const char* hex) {
