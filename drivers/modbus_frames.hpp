@@ -9,8 +9,8 @@
 
 #include "drivers/bytes.hpp"
 #include "drivers/fault.hpp"
-#include "drivers/unread.hpp"
 #include "drivers/resync.hpp"
+#include "drivers/unread.hpp"
 
 namespace drivers::modbus {
 

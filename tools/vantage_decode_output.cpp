@@ -16,11 +16,22 @@ using drivers::Message;
 
 constexpr std::size_t kShownMax = 8;  // Of a vector, to people.
 
+// Devices send what they like; what is printed is ASCII that can be printed: other bytes as \xNN.
+std::string printable(const std::string& text) {
+  std::string result;
+  for (const char c : text)
+    result += c >= ' ' && c <= '~' ? std::string(1, c)
+                                   : fmt::format("\\x{:02X}", static_cast<unsigned char>(c));
+  return result;
+}
+
 std::string scalar_text(const Field& field) {
   return std::visit(
       []<class T>(const T& value) -> std::string {
         if constexpr (std::is_same_v<T, std::vector<double>>)
           return fmt::format("{}", fmt::join(value, " "));
+        else if constexpr (std::is_same_v<T, std::string>)
+          return printable(value);
         else
           return fmt::format("{}", value);
       },
@@ -69,6 +80,8 @@ boost::json::value json_value(const Field& field) {
       []<class T>(const T& value) -> boost::json::value {
         if constexpr (std::is_same_v<T, std::vector<double>>)
           return boost::json::array(value.begin(), value.end());
+        else if constexpr (std::is_same_v<T, std::string>)
+          return boost::json::value(printable(value));
         else
           return boost::json::value(value);
       },

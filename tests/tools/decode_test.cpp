@@ -82,6 +82,14 @@ TEST_F(Decode, TakesTheSidesOfADumpAsTheyAreOrSwapped) {
   EXPECT_EQ(run("decode modbus --swap " + dump.string()).code, 1);
 }
 
+TEST_F(Decode, PrintsOnlyWhatCanBePrinted) {
+  const auto file = write("ptu", "* \xFF\x01\r\n");
+  for (const char* style : {"", "--json ", "--csv "}) {
+    const auto outcome = run("decode ptu " + std::string(style) + file.string());
+    for (const char c : outcome.out) EXPECT_TRUE(c == '\n' || (c >= ' ' && c <= '~')) << int{c};
+  }
+}
+
 TEST_F(Decode, RefusesWhatItCannotUseAndSaysWhy) {
   const auto log = write("drive.log", kDrive).string();
   const std::tuple<std::string, int, std::string> cases[] = {
