@@ -60,7 +60,8 @@ class Human : public Output {
 
   void message(const Message& message) override {
     const std::string time = message.t_s ? fmt::format("{:.6f} ", *message.t_s) : "";
-    std::string line = fmt::format("{}{} {}", time, message.from_device ? "<" : ">", message.name);
+    std::string line =
+        fmt::format("{}{} {}", time, message.from_device ? "<" : ">", printable(message.name));
     for (const Field& field : message.fields)
       line += fmt::format("  {}={}", field.name, human_text(field));
     fmt::print(out_, "{}\n", line);
@@ -96,7 +97,7 @@ class Json : public Output {
     boost::json::object object;
     if (message.t_s) object["t_s"] = *message.t_s;
     object["from_device"] = message.from_device;
-    object["message"] = message.name;
+    object["message"] = printable(message.name);
     boost::json::object& fields = (object["fields"] = boost::json::object()).get_object();
     for (const Field& field : message.fields) add(fields, field);
     line(object);
@@ -136,8 +137,8 @@ class Csv : public Output {
 
   void message(const Message& message) override {
     const std::string time = message.t_s ? fmt::format("{:.6f}", *message.t_s) : "";
-    const std::string head =
-        fmt::format("{},{},{},{}", ++number_, time, message.from_device, quoted(message.name));
+    const std::string head = fmt::format("{},{},{},{}", ++number_, time, message.from_device,
+                                         quoted(printable(message.name)));
     if (message.fields.empty()) fmt::print(out_, "{},,\n", head);
     for (const Field& field : message.fields)
       fmt::print(out_, "{},{},{}\n", head, quoted(field.name), quoted(scalar_text(field)));

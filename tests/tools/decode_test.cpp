@@ -83,9 +83,12 @@ TEST_F(Decode, TakesTheSidesOfADumpAsTheyAreOrSwapped) {
 }
 
 TEST_F(Decode, PrintsOnlyWhatCanBePrinted) {
-  const auto file = write("ptu", "* \xFF\x01\r\n");
+  const auto file = write("gpsd.log",
+                          "{\"class\":\"VERSION\",\"release\":\"3.\\u0001\xC3\xA9\"}\n"
+                          "{\"class\":\"D\xC3\xA9\"}\n");
   for (const char* style : {"", "--json ", "--csv "}) {
-    const auto outcome = run("decode ptu " + std::string(style) + file.string());
+    const auto outcome = run("decode gpsd " + std::string(style) + file.string());
+    EXPECT_THAT(outcome.out, testing::AllOf(HasSubstr("3."), HasSubstr("C3"))) << style;
     for (const char c : outcome.out) EXPECT_TRUE(c == '\n' || (c >= ' ' && c <= '~')) << int{c};
   }
 }
