@@ -256,7 +256,7 @@ void NextViews(benchmark::State& state) {
   const auto counts = planning::tally(q.map, q.boundary, q.candidates, kLimits, threads);
   std::vector<planning::PlannedView> views;
   for (auto _ : state)
-    views = planning::next_views(s.map, s.boundary, s.candidates, counts, s.limits,
+    views = planning::next_views(q.map, q.boundary, q.candidates, counts, kLimits,
                                  {.views_max = 5, .adds_min_voxels = 1, .threads = threads});
   std::uint64_t adds = 0;
   for (const planning::PlannedView& view : views) adds += view.adds_voxels;

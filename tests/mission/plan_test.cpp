@@ -52,9 +52,9 @@ std::vector<planning::Candidate> everywhere(const nav::FreeArea& area) {
   return stations;
 }
 
-class ShippedSite : public testing::TestWithParam<std::string> {};
+class ShippedPlan : public testing::TestWithParam<std::string> {};
 
-TEST_P(ShippedSite, IsCoveredAlmostAsFarAsAnyReachableStationCould) {
+TEST_P(ShippedPlan, IsCoveredAlmostAsFarAsAnyReachableStationCould) {
   const double goal = GetParam() == "fort" ? 0.98 : 0.95;
   const PlannedSite site = plan_shipped(GetParam());
   ASSERT_FALSE(site.plans.empty());
@@ -77,7 +77,7 @@ TEST_P(ShippedSite, IsCoveredAlmostAsFarAsAnyReachableStationCould) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Plan, ShippedSite,
+INSTANTIATE_TEST_SUITE_P(Missions, ShippedPlan,
                          testing::Values("fort", "tower", "courtyard", "church", "museum"),
                          [](const auto& param) { return param.param; });
 
