@@ -55,11 +55,13 @@ void DensityGoal::find_thin() {
   }
 }
 
-void DensityGoal::expect(const planning::VoxelMap& map, planning::Voxel p) {
-  expected_.clear();
-  if (!is_set()) return;
+std::vector<planning::Voxel> DensityGoal::in_sight(const planning::VoxelMap& map,
+                                                   planning::Voxel p) const {
+  std::vector<planning::Voxel> voxels;
+  if (!is_set()) return voxels;
   for (const std::uint32_t i : planning::visible_from(map, thin_, p, limits_))
-    expected_.push_back(thin_[i].v);
+    voxels.push_back(thin_[i].v);
+  return voxels;
 }
 
 std::uint64_t DensityGoal::settle() {

@@ -33,8 +33,10 @@ class DensityGoal {
   // worth seeing again for a view that reaches the goal. Ordered by z, then y, then x.
   const std::vector<planning::BoundaryVoxel>& thin() const { return thin_; }
 
-  // Takes note of what a view from p should bring to the goal; after add(), how much of it did.
-  void expect(const planning::VoxelMap& map, planning::Voxel p);
+  // Of thin(), what a view from p would bring to the goal.
+  std::vector<planning::Voxel> in_sight(const planning::VoxelMap& map, planning::Voxel p) const;
+  // Takes note of what a view should bring to the goal; after add(), how much of it did.
+  void expect(std::vector<planning::Voxel> voxels) { expected_ = std::move(voxels); }
   std::uint64_t settle();
 
   DensityFacts facts() const { return {goal_ppm2_, surface_, reached_}; }

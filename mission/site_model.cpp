@@ -295,7 +295,7 @@ std::vector<NextView> SiteModel::next_views() {
                      .voxels = voxels});
   }
   std::ranges::stable_sort(views, std::ranges::greater{}, &NextView::voxels);
-  return views;
+  return faced(std::move(views));
 }
 
 std::vector<ViewAhead> SiteModel::views_ahead(const std::vector<CellTally>& tallies,
@@ -309,15 +309,6 @@ std::vector<ViewAhead> SiteModel::views_ahead(const std::vector<CellTally>& tall
                             {.views_max = count, .adds_min_voxels = 1, .threads = threads_}))
     views.push_back({tallies[view.candidate].cell, view.sees_voxels, view.adds_voxels});
   return views;
-}
-
-void SiteModel::expect(const NextView& view) {
-  const auto worth = worth_seeing();
-  expected_.clear();
-  for (const std::uint32_t i : planning::visible_from(planner_map(), worth, view.cell.voxel,
-                                                      view_limits(config_.robot.scanner)))
-    expected_.push_back(worth[i].v);
-  density_.expect(planner_map(), view.cell.voxel);
 }
 
 std::uint64_t SiteModel::settle() {

@@ -76,7 +76,11 @@ class SiteModel {
 
   // Candidates by gain, best first, ties to the lowest index; those below the threshold are left
   // out. Empty: no view would add enough. best_voxels() tells the maximum all the same.
+  // A scanner that does not see all around faces where it sees the most (site_facing.cpp).
   std::vector<NextView> next_views();
+  // Whether next_views() left out some that may also see enough: ask again when none can be
+  // reached.
+  bool views_left_out() const { return views_left_out_; }
   std::uint64_t best_voxels() const { return best_voxels_; }
 
   // The next `count` views at once, threshold and density aside (planning::next_views); `tallies`
@@ -123,6 +127,9 @@ class SiteModel {
   int grow(const planning::InsertReport& report);
   void look_through();
   void find_boundary();
+  std::vector<NextView> faced(std::vector<NextView> views);
+  std::vector<planning::Voxel> unseen_in_sight(const std::vector<planning::BoundaryVoxel>& worth,
+                                               const planning::Voxel& cell) const;
   bool is_in_site(const planning::Voxel& v) const;
   bool is_set_aside(const planning::Voxel& v) const;
   std::vector<planning::BoundaryVoxel> worth_seeing() const;
@@ -147,6 +154,7 @@ class SiteModel {
   DensityGoal density_;
   std::vector<CellTally> last_tally_;
   std::uint64_t best_voxels_{};
+  bool views_left_out_{};
   std::uint64_t set_aside_{};
 
   nav::RasterGrid obstacle_grid_;

@@ -191,7 +191,7 @@ hal::Task<void> Survey::tour(std::size_t t) {
 }
 
 hal::Task<void> Survey::refine() {
-  for (int taken = 0; taken < config_.phase2.views_max; views_taken_ = ++taken) {
+  while (views_taken_ < config_.phase2.views_max) {
     std::vector<NextView> views = choose_views();
     if (views.empty()) {
       record_.end = fmt::format(
@@ -211,14 +211,15 @@ hal::Task<void> Survey::refine() {
       const NextView view = views[*chosen];
       views.erase(views.begin() + static_cast<std::ptrdiff_t>(*chosen));
       model_.exclude(view.cell.voxel);
-      const Stop stop{.name = fmt::format("NBV {}", taken + 1),
+      const Stop stop{.name = fmt::format("NBV {}", views_taken_ + 1),
                       .task = view.cell.task,
                       .pose = view.pose,
                       .station = nullptr,
                       .view = &view};
       done = co_await visit(stop);
     }
-    if (!done) {
+    views_taken_ += done;
+    if (!done && !model_.views_left_out()) {
       record_.end = "none of the views that would add enough can be reached";
       note_leftover(false);
       co_return;

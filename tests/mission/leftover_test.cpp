@@ -204,7 +204,7 @@ TEST(DensityGoal, GivesUpOnAVoxelAfterTwoViewsThatShouldHaveBroughtItThere) {
   goal.add(map, coarse, pose);
   for (int tries = 0; tries < 2; ++tries) {
     ASSERT_EQ(goal.thin().size(), 1U) << tries;
-    goal.expect(map, {4, 1, 1});
+    goal.expect(goal.in_sight(map, {4, 1, 1}));
     goal.add(map, coarse, pose);
     EXPECT_EQ(goal.settle(), 0U);
   }

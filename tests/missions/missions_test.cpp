@@ -5,6 +5,7 @@
 #include <boost/json.hpp>
 #include <cstdlib>
 #include <fstream>
+#include <set>
 
 #include "run_mission.hpp"
 
@@ -82,6 +83,33 @@ TEST(Missions, RepeatByteForByteWithTheSameSeedAndAnyNumberOfThreads) {
   ASSERT_EQ(other.exit_code, 0) << other.output;
   EXPECT_NE(decisions, missions::read_text(other.folder / "decisions.jsonl"));
   for (const MissionRun* run : {&one, &two, &other}) std::filesystem::remove_all(run->folder);
+}
+
+// A scanner that sees 120 deg turns to what its next best views are for.
+TEST(Missions, NarrowScannersFaceWhatTheyAreToSee) {
+  const auto configs = missions::configs();
+  const auto folder =
+      std::filesystem::temp_directory_path() / ("vantage-narrow-" + std::to_string(getpid()));
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "narrow.toml") << "[scanner]\nfov_deg = 120.0\n";
+  std::ofstream(folder / "mission.toml")
+      << "robot = \"narrow.toml\"\nsite = \"" << (configs / "sites" / "courtyard").string()
+      << "\"\n[phase2]\nheight_m = 52.0\ngain_min_voxels = 60\nviews_max = 8\n";
+  const MissionRun run = missions::run(folder / "mission.toml", "narrow", {"--quiet"});
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  double predicted = 0, resolved = 0;
+  std::set<double> headings;
+  for (const auto& scan : run.summary.at("scans").as_array()) {
+    if (scan.at("kind").as_string() == "station") continue;
+    predicted += number(scan.at("predicted_voxels"));
+    resolved += number(scan.at("resolved_voxels"));
+    headings.insert(number(scan.at("planned").at("heading_deg")));
+  }
+  EXPECT_GE(headings.size(), 3U);
+  EXPECT_GE(resolved, 0.7 * predicted);
+  EXPECT_GT(predicted, 0);
+  std::filesystem::remove_all(run.folder);
+  std::filesystem::remove_all(folder);
 }
 
 TEST(Missions, SurviveTwentySeeds) {
