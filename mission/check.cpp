@@ -7,6 +7,7 @@
 #include <limits>
 #include <regex>
 
+#include "mission/plan_file.hpp"
 #include "mission/suggest.hpp"
 
 namespace mission {
@@ -119,7 +120,10 @@ std::vector<ConfigError> check_site(const MissionConfig& config, const nav::Repa
   for (const auto& error : site.errors)
     errors.push_back(site_error(error, config.site_folder.generic_string()));
   if (!errors.empty()) return errors;  // A broken map says nothing more.
-  return SiteCheck{config, site.map, areas}.run();
+  errors = SiteCheck{config, site.map, areas}.run();
+  const auto of_plan = check_plan(config, areas);
+  errors.insert(errors.end(), of_plan.begin(), of_plan.end());
+  return errors;
 }
 
 }  // namespace mission

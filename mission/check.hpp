@@ -21,8 +21,9 @@ inline constexpr double kVoxelsMax = 400e6;
 ConfigError site_error(const std::string& text, const std::string& file);
 
 // What stands between this mission and this site: errors of the map, regions in the mission that
-// the map lacks or where nobody can stand, a start outside the free space, too many voxels. `areas`
-// is free_areas(site.map, config.robot.body.radius_m, kFreeAreaMinM2). Pure.
+// the map lacks or where nobody can stand, a start outside the free space, too many voxels,
+// stations of its plan file that stand where nobody can. `areas` is free_areas(site.map,
+// config.robot.body.radius_m, kFreeAreaMinM2). Pure.
 std::vector<ConfigError> check_site(const MissionConfig& config, const nav::RepairedSite& site,
                                     const std::vector<nav::FreeArea>& areas);
 

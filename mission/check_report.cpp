@@ -23,6 +23,9 @@ void check_its_site(MissionCheck& check) {
   for (const auto& error : loaded.errors)
     check.errors.push_back(site_error(error, check.config.site_folder.generic_string()));
   if (!loaded.errors.empty()) return;
+  check.model_file = loaded.model_file;
+  check.ground_mapped = std::ranges::any_of(
+      loaded.raw.features, [](const auto& feature) { return feature.ground_z_m.has_value(); });
   check.site = nav::repair_site(loaded.raw, check.config.margin_m);
   if (check.site.errors.empty())
     check.areas = nav::free_areas(check.site.map, check.config.robot.body.radius_m, kFreeAreaMinM2);
@@ -133,13 +136,18 @@ std::string check_text(const MissionCheck& check) {
          values_text(check.config) + site_text(check);
 }
 
+boost::json::array errors_json(const std::vector<ConfigError>& errors) {
+  boost::json::array list;
+  for (const auto& error : errors)
+    list.push_back(boost::json::object{{"file", error.file},
+                                       {"line", error.line},
+                                       {"column", error.column},
+                                       {"message", error.message}});
+  return list;
+}
+
 boost::json::value check_json(const MissionCheck& check) {
-  boost::json::array errors, repairs, notes, areas;
-  for (const auto& error : check.errors)
-    errors.push_back(boost::json::object{{"file", error.file},
-                                         {"line", error.line},
-                                         {"column", error.column},
-                                         {"message", error.message}});
+  boost::json::array repairs, notes, areas;
   for (const auto& repair : check.site.repairs)
     repairs.push_back(boost::json::object{{"where", repair.where}, {"what", repair.what}});
   for (const auto& note : check.notes) notes.emplace_back(note);
@@ -147,9 +155,10 @@ boost::json::value check_json(const MissionCheck& check) {
     areas.push_back(boost::json::object{{"name", area.name},
                                         {"region", area.region},
                                         {"area_m2", rounded(nav::area_m2(area.standable), 2)}});
-  return boost::json::object{{"ok", check.errors.empty()},          {"errors", std::move(errors)},
-                             {"repairs", std::move(repairs)},       {"notes", std::move(notes)},
-                             {"values", values_json(check.config)}, {"areas", std::move(areas)}};
+  return boost::json::object{
+      {"ok", check.errors.empty()},          {"errors", errors_json(check.errors)},
+      {"repairs", std::move(repairs)},       {"notes", std::move(notes)},
+      {"values", values_json(check.config)}, {"areas", std::move(areas)}};
 }
 
 }  // namespace mission

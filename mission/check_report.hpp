@@ -1,8 +1,10 @@
 // A mission checked against its files and its site, and the result in words: `vantage check`.
 #pragma once
 
+#include <boost/json/array.hpp>
 #include <boost/json/value.hpp>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,10 +17,12 @@ namespace mission {
 
 struct MissionCheck {
   MissionConfig config;
-  nav::RepairedSite site;            // As far as it could be read.
-  std::vector<nav::FreeArea> areas;  // Empty when the site has errors.
-  std::vector<std::string> notes;    // What reading the site found worth saying.
-  std::vector<ConfigError> errors;   // Mission file, robot file, command line, site.
+  bool ground_mapped{};                             // The map says how high its ground lies.
+  std::optional<std::filesystem::path> model_file;  // The site's 3-D model.
+  nav::RepairedSite site;                           // As far as it could be read.
+  std::vector<nav::FreeArea> areas;                 // Empty when the site has errors.
+  std::vector<std::string> notes;                   // What reading the site found worth saying.
+  std::vector<ConfigError> errors;                  // Mission file, robot file, command line, site.
 };
 
 // Reads the mission, its robot and its site, and checks everything in one run: errors of the config
@@ -27,6 +31,9 @@ MissionCheck check_mission(const std::filesystem::path& file, const Overrides& o
 
 // The effective values with their origin and what the site holds, on one screen of 100 columns.
 std::string check_text(const MissionCheck& check);
+
+// [{"file", "line", "column", "message"}]
+boost::json::array errors_json(const std::vector<ConfigError>& errors);
 
 // {"ok", "errors": [{"file", "line", "column", "message"}], "repairs": [{"where", "what"}],
 //  "notes", "values": [{"key", "value", "unit", "origin"}], "areas": [{"name", "region",

@@ -11,6 +11,7 @@
 
 #include "mission/config_reader.hpp"
 #include "mission/config_schema.hpp"
+#include "mission/plan_file.hpp"
 #include "mission/suggest.hpp"
 
 namespace mission {
@@ -23,8 +24,9 @@ constexpr double kBeamsMax = 20e6;
 // Everything known about one mission while it is read.
 struct Draft {
   LoadedMission loaded;
-  ConfigReading mission, robot;
+  ConfigReading mission, robot, plan;
   std::string robot_name;  // For messages; "" while no robot file is read.
+  std::string plan_name;   // The same for the plan file.
 
   MissionConfig& config() { return loaded.config; }
   bool good(const std::string& path) const {
@@ -98,10 +100,11 @@ void check_voxels(Draft& draft) {
                       config.robot.scanner.height_m, height_m));
 }
 
-// Mission file first, then the robot file, then the rest; by line and column within.
+// Mission file first, then the robot file, the plan file and the rest; by line and column within.
 void sort_errors(Draft& draft) {
   const auto rank = [&](const ConfigError& error) {
-    return error.file == draft.config().file ? 0 : error.file == draft.robot_name ? 1 : 2;
+    if (error.file == draft.config().file) return 0;
+    return error.file == draft.robot_name ? 1 : error.file == draft.plan_name ? 2 : 3;
   };
   std::stable_sort(draft.loaded.errors.begin(), draft.loaded.errors.end(),
                    [&](const ConfigError& a, const ConfigError& b) {
@@ -114,7 +117,7 @@ void read_mission_text(Draft& draft, std::string_view text, const std::string& f
   auto& config = draft.config();
   config.file = file;
   draft.mission = read_config(ConfigFile::mission, text, file, config);
-  if (config.name.empty()) config.name = fs::path(file).stem().string();
+  if (config.name.empty() && !file.starts_with("(")) config.name = fs::path(file).stem().string();
   if (config.name.empty()) config.name = "mission";
 }
 
@@ -127,6 +130,7 @@ LoadedMission finish(Draft& draft) {
   auto& errors = draft.loaded.errors;
   errors.insert(errors.end(), draft.mission.errors.begin(), draft.mission.errors.end());
   errors.insert(errors.end(), draft.robot.errors.begin(), draft.robot.errors.end());
+  errors.insert(errors.end(), draft.plan.errors.begin(), draft.plan.errors.end());
   check_scanner(draft);
   check_voxels(draft);
   sort_errors(draft);
@@ -164,17 +168,42 @@ ConfigPlace place_of(const Draft& draft, const std::string& path) {
   return {draft.loaded.config.file, 1, 1};
 }
 
-void load_robot(Draft& draft, const fs::path& mission_file) {
-  auto& path = draft.config().robot_file;
-  if (path.empty()) return;  // The defaults are a working robot.
+// The text of a file that the mission names by `key`, whose path becomes relative to the working
+// folder; empty, with an error, when it cannot be read.
+std::optional<std::string> named_file(Draft& draft, const fs::path& mission_file,
+                                      const std::string& key, fs::path& path) {
   path = relative_to(mission_file, path);
-  const auto text = read_file(path);
+  auto text = read_file(path);
   if (!text)
-    return draft.fail(place_of(draft, "robot"),
-                      fmt::format("robot file '{}' cannot be read (the path is relative to the "
-                                  "mission file){}",
-                                  path.generic_string(), guess_sibling(path)));
-  read_robot_text(draft, *text, path.generic_string());
+    draft.fail(place_of(draft, key),
+               fmt::format("{} file '{}' cannot be read (the path is relative to the mission "
+                           "file){}",
+                           key, path.generic_string(), guess_sibling(path)));
+  return text;
+}
+
+void load_robot(Draft& draft, const fs::path& mission_file, const fs::path& replacement) {
+  auto& path = draft.config().robot_file;
+  if (!replacement.empty()) {
+    path = replacement;
+    draft.config().written["robot"] = {"--robot", 0, 0};
+    if (const auto text = read_file(path))
+      return read_robot_text(draft, *text, path.generic_string());
+    return draft.fail({"--robot", 0, 0}, fmt::format("robot file '{}' cannot be read{}",
+                                                     path.generic_string(), guess_sibling(path)));
+  }
+  if (path.empty()) return;  // The defaults are a working robot.
+  if (const auto text = named_file(draft, mission_file, "robot", path))
+    read_robot_text(draft, *text, path.generic_string());
+}
+
+void load_plan(Draft& draft, const fs::path& mission_file) {
+  auto& path = draft.config().plan_file;
+  if (path.empty()) return;
+  const auto text = named_file(draft, mission_file, "plan", path);
+  if (!text) return;
+  draft.plan_name = path.generic_string();
+  draft.plan = read_plan(*text, draft.plan_name, draft.config());
 }
 
 // Only that it is there (a folder, or a map file); what it holds is read with the site.
@@ -213,18 +242,21 @@ std::string ConfigError::text() const {
 LoadedMission load_mission(const fs::path& file, const Overrides& overrides) {
   Draft draft;
   draft.config().file = file.generic_string();
-  const auto text = read_file(file);
+  const auto text = file.empty() ? std::string() : read_file(file);
   if (!text) {
     draft.fail({file.generic_string(), 0, 0}, "mission file cannot be read" + guess_sibling(file));
     return std::move(draft.loaded);
   }
-  read_mission_text(draft, *text, file.generic_string());
+  read_mission_text(draft, *text, file.empty() ? "(no mission file)" : file.generic_string());
   if (overrides.has_seed) {
     draft.config().seed = overrides.seed;
     draft.config().written["seed"] = {"--seed", 0, 0};
   }
   check_site_folder(draft, file, overrides);
-  load_robot(draft, file);
+  load_robot(draft, file, overrides.robot_file);
+  if (overrides.radius_m) draft.config().robot.body.radius_m = *overrides.radius_m;
+  if (overrides.margin_m) draft.config().margin_m = *overrides.margin_m;
+  load_plan(draft, file);
   return finish(draft);
 }
 

@@ -4,7 +4,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -45,11 +47,21 @@ struct SimConfig {
   double placement_s = 900.0;  // Time to carry it there and set it up.
 };
 
+// [battery] of the robot file: what `vantage plan` reckons with. Watts are all that the robot draws
+// in that state, scanner and computers included.
+struct BatteryConfig {
+  double capacity_wh = 720;
+  double drive_w = 180;
+  double scan_w = 70;
+  double idle_w = 50;  // While a person carries the scanner.
+};
+
 struct RobotConfig {
   std::string name = "robot";
   std::string backend = "sim";  // "sim" (hardware backends come with the drivers)
   BodyConfig body;
   ScannerConfig scanner;
+  BatteryConfig battery;
   SimConfig sim;
 };
 
@@ -84,10 +96,29 @@ struct ConfigPlace {
   int column{};
 };
 
+// [[station]] of a plan file: a place to scan from, as chosen before.
+struct SavedStation {
+  std::string area;                                       // Name of the free area.
+  std::string name;                                       // "" : numbered within its area.
+  double x_m = std::numeric_limits<double>::quiet_NaN();  // Until it is read.
+  double y_m = std::numeric_limits<double>::quiet_NaN();
+  double heading_deg{};
+  ConfigPlace place;  // Of the [[station]].
+};
+
+// A plan file: the stations of a rehearsal, or of an earlier survey, to be visited again.
+struct SavedPlan {
+  std::string site;                    // What made it, for people: the site,
+  std::string made_by;                 // the command,
+  std::uint64_t seed{};                // and the seed.
+  std::vector<SavedStation> stations;  // Within an area in the order chosen.
+};
+
 struct MissionConfig {
   std::string name;                   // Default: the file's name without extension.
   std::filesystem::path robot_file;   // Key `robot`, relative to the mission file.
   std::filesystem::path site_folder;  // Key `site`, relative to the mission file.
+  std::filesystem::path plan_file;    // Key `plan`, relative to the mission file; may be empty.
   std::uint64_t seed = 1;
   double margin_m = 30.0;  // From the obstacles to the boundary where the map has none.
   bool return_home = true;
@@ -95,6 +126,7 @@ struct MissionConfig {
   Phase1Config phase1;
   Phase2Config phase2;
   RobotConfig robot;  // Read from robot_file.
+  SavedPlan plan;     // Read from plan_file; without one Phase I is planned.
 
   // Where each value that is not a default came from, by the path of the member it set: "seed",
   // "robot" and "site" (the keys), "phase2.voxel_m", "regions.moat", "robot.scanner.range_max_m".
@@ -117,16 +149,21 @@ struct LoadedMission {
   std::vector<ConfigError> errors;  // Not empty: refuse to start.
 };
 
-// What the command line may replace: --site DIR and --seed N.
+// What the command line may replace: --site DIR, --robot FILE and --seed N.
 struct Overrides {
   std::filesystem::path site_folder;
+  std::filesystem::path robot_file;
   bool has_seed{};
   std::uint64_t seed{};
+  // Of a run whose files are not at hand: where its robot could stand, and where its site ended.
+  std::optional<double> radius_m = std::nullopt;
+  std::optional<double> margin_m = std::nullopt;
 };
 
-// Reads the mission file and the robot file it names. Never throws for what a file says. Errors are
-// sorted: mission file, robot file, command line; by line and column within. Paths in the result
-// are relative to the working folder (or absolute), not to the file that named them.
+// Reads the mission file, and the robot file and the plan file that it names. Without a mission
+// file (empty path) every key of it has its default. Never throws for what a file says. Errors are
+// sorted: mission file, robot file, plan file, command line; by line and column within. Paths in
+// the result are relative to the working folder (or absolute), not to the file that named them.
 LoadedMission load_mission(const std::filesystem::path& file, const Overrides& overrides = {});
 
 // The same from text, for tests and fuzzing; `robot` keys are read from robot_text when not empty.

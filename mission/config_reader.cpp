@@ -161,11 +161,25 @@ class Reader {
 
  private:
   void read_named(const SectionSpec& section, const toml::node& node) {
+    if (section.add_entry) return read_entries(section, node);
     if (const auto* table = node.as_table()) return read_section(section, *table);
     fail(
         node.source().begin,
         fmt::format("'{0}' must be a table, found {1}; write [{0}] and its keys on the lines below",
                     section.name, found(node)));
+  }
+
+  void read_entries(const SectionSpec& section, const toml::node& node) {
+    const auto* entries = node.as_array();
+    if (!entries || !entries->is_array_of_tables())
+      return fail(
+          node.source().begin,
+          fmt::format("'{0}' must be tables, found {1}; write [[{0}]] before each one's keys",
+                      section.name, found(node)));
+    for (const toml::node& entry : *entries) {
+      section.add_entry(config_, place(entry.source().begin));
+      read_section(section, *entry.as_table());
+    }
   }
 
   void read_section(const SectionSpec& section, const toml::table& table) {
@@ -231,12 +245,18 @@ class Reader {
     return text + "; known here: " + listed(known);
   }
 
+  // Few people write plan files: nobody means their keys elsewhere.
+  bool foreign(const SectionSpec& section) const {
+    return section.file == ConfigFile::plan && which_ != ConfigFile::plan;
+  }
+
   // Keys of this section first; then of the file's others, then of the other file.
   std::string guess_key(const SectionSpec& here, const std::string& key) const {
     double best = kUnlike;
     std::vector<std::pair<const SectionSpec*, const KeySpec*>> nearest;
     for (const auto& section : config_schema())
       for (const auto& spec : section.keys) {
+        if (foreign(section)) continue;
         const double away = &section == &here ? 0 : section.file == which_ ? 0.6 : 0.9;
         const double unlike = unlikeness(key, spec.key) + away;
         if (unlike > best || unlike >= kUnlike) continue;
@@ -275,7 +295,7 @@ class Reader {
     double best = kUnlike;
     const SectionSpec* nearest = nullptr;
     for (const auto& section : config_schema()) {
-      if (section.name.empty()) continue;
+      if (section.name.empty() || foreign(section)) continue;
       const double unlike = unlikeness(key, section.name) + (section.file == which_ ? 0 : 0.5);
       if (unlike >= best) continue;
       best = unlike;

@@ -49,9 +49,13 @@ SectionSpec mission_section() {
                       "Folder with footprint.geojson, relative to this file; or give `--site DIR`"),
            keys.number("seed", &C::seed, 0, kSeedMax, "",
                        "Of every random choice: the same seed gives the same run"),
+           keys.other("plan", &C::plan_file,
+                      "Plan file (`vantage rehearse`), relative to this file: its stations are "
+                      "toured and no others planned"),
            keys.number("margin_m", &C::margin_m, 0, 10'000, "m",
                        "From the obstacles to the boundary, where the map draws no boundary"),
            keys.other("return_home", &C::return_home, "Drive back to the start at the end")},
+          {},
           {}};
 }
 
@@ -74,6 +78,7 @@ SectionSpec phase1_section() {
                    "Of the target wall; stop when the next station adds less"),
        keys.number("overlap_min", &P::overlap_min, 0, 0.95, "share",
                    "Of what a station sees that earlier stations must see too")},
+      {},
       {}};
 }
 
@@ -109,6 +114,7 @@ SectionSpec phase2_section() {
            keys.number("density_min_ppm2", &P::density_min_ppm2, 0, 1e6, "points/m2",
                        "Surfaces that no scan put as many points on are worth seeing again; 0: no "
                        "such goal")},
+          {},
           {}};
 }
 
@@ -119,7 +125,8 @@ SectionSpec regions_section() {
           "the scanner there) or `\"skip\"`. A region that is not named is scanned by the robot if "
           "it starts there, and by hand otherwise.",
           {},
-          {"robot", "manual", "skip"}};
+          {"robot", "manual", "skip"},
+          {}};
 }
 
 SectionSpec robot_section() {
@@ -130,6 +137,7 @@ SectionSpec robot_section() {
           "Which robot.",
           {keys.other("name", &R::name, "What reports call the robot"),
            keys.other("backend", &R::backend, "What carries it out", {"sim"})},
+          {},
           {}};
 }
 
@@ -144,6 +152,7 @@ SectionSpec body_section() {
            keys.number("track_m", &B::track_m, 0.05, 5, "m", "Between left and right wheels"),
            keys.number("speed_max_mps", &B::speed_max_mps, 0.01, 10, "m/s", "Driving straight"),
            keys.number("turn_max_degps", &B::turn_max_degps, 1, 360, "deg/s", "Turning")},
+          {},
           {}};
 }
 
@@ -167,6 +176,23 @@ SectionSpec scanner_section() {
            keys.number("elevation_step_deg", &S::elevation_step_deg, 0.005, 10, "deg",
                        "Between neighbouring beams of a column"),
            keys.number("scan_s", &S::scan_s, 0, 86'400, "s", "Time one scan takes")},
+          {},
+          {}};
+}
+
+SectionSpec battery_section() {
+  using B = BatteryConfig;
+  const Keys<B> keys{[](MissionConfig& c) -> B& { return c.robot.battery; }};
+  return {ConfigFile::robot,
+          "battery",
+          "What `vantage plan` reckons with. Watts are all that the robot draws in that state, "
+          "computers and scanner included.",
+          {keys.number("capacity_wh", &B::capacity_wh, 1, 1e6, "Wh", "That may be used up"),
+           keys.number("drive_w", &B::drive_w, 0, 1e5, "W", "While driving"),
+           keys.number("scan_w", &B::scan_w, 0, 1e5, "W", "Standing, while the robot scans"),
+           keys.number("idle_w", &B::idle_w, 0, 1e5, "W",
+                       "Standing, while a person carries the scanner and scans")},
+          {},
           {}};
 }
 
@@ -190,7 +216,40 @@ SectionSpec sim_section() {
                        "The same for its heading"),
            keys.number("placement_s", &S::placement_s, 0, 86'400, "s",
                        "Time to carry the scanner to a station and set it up")},
+          {},
           {}};
+}
+
+SectionSpec plan_section() {
+  using P = SavedPlan;
+  const Keys<P> keys{[](MissionConfig& c) -> P& { return c.plan; }};
+  return {ConfigFile::plan,
+          "",
+          "Stations chosen before, by `vantage rehearse` or `vantage plan --out`.",
+          {keys.other("site", &P::site, "Name of the site that they were chosen on"),
+           keys.other("made_by", &P::made_by, "What chose them"),
+           keys.number("seed", &P::seed, 0, kSeedMax, "", "With which seed")},
+          {},
+          {}};
+}
+
+SectionSpec station_section() {
+  using S = SavedStation;
+  const Keys<S> keys{[](MissionConfig& c) -> S& { return c.plan.stations.back(); }};
+  return {ConfigFile::plan,
+          "station",
+          "One place to scan from; `[[station]]` for each. Within an area they count in the order "
+          "of the file; the tour visits them in the order that is shortest.",
+          {keys.other("area", &S::area, "The free area that it stands in; must be given"),
+           keys.other("name", &S::name, "What reports call it; default: the area and a number"),
+           keys.number("x_m", &S::x_m, -1e6, 1e6, "m", "East; must be given"),
+           keys.number("y_m", &S::y_m, -1e6, 1e6, "m", "North; must be given"),
+           keys.number("heading_deg", &S::heading_deg, -360, 360, "deg",
+                       "Of the scanner, from east to north")},
+          {},
+          [](MissionConfig& c, const ConfigPlace& place) {
+            c.plan.stations.emplace_back().place = place;
+          }};
 }
 
 std::string value_text(const Slot& slot) {
@@ -219,8 +278,12 @@ std::string type_text(const KeySpec& spec, const Slot& slot) {
 }
 
 std::string heading(const SectionSpec& section) {
-  if (!section.name.empty()) return fmt::format("### `[{}]`\n\n{}\n\n", section.name, section.help);
-  const std::string title = section.file == ConfigFile::mission ? "Mission file" : "Robot file";
+  const std::string brackets =
+      section.add_entry ? fmt::format("[[{}]]", section.name) : fmt::format("[{}]", section.name);
+  if (!section.name.empty()) return fmt::format("### `{}`\n\n{}\n\n", brackets, section.help);
+  const std::string title = section.file == ConfigFile::mission ? "Mission file"
+                            : section.file == ConfigFile::robot ? "Robot file"
+                                                                : "Plan file";
   return fmt::format("## {}\n\n{} These keys stand above the first `[table]`.\n\n", title,
                      section.help);
 }
@@ -228,18 +291,20 @@ std::string heading(const SectionSpec& section) {
 }  // namespace
 
 std::string_view name(ConfigFile file) {
-  return file == ConfigFile::mission ? "mission" : "robot";
+  return file == ConfigFile::mission ? "mission" : file == ConfigFile::robot ? "robot" : "plan";
 }
 
 const std::vector<SectionSpec>& config_schema() {
   static const std::vector<SectionSpec> schema{
       mission_section(), phase1_section(), phase2_section(),  regions_section(),
-      robot_section(),   body_section(),   scanner_section(), sim_section()};
+      robot_section(),   body_section(),   scanner_section(), battery_section(),
+      sim_section(),     plan_section(),   station_section()};
   return schema;
 }
 
 std::string member_path(const SectionSpec& section, std::string_view key) {
-  std::string path = section.file == ConfigFile::robot ? "robot." : "";
+  std::string path =
+      section.file == ConfigFile::mission ? "" : fmt::format("{}.", name(section.file));
   if (!section.name.empty()) path += section.name + ".";
   return path.append(key);
 }
@@ -250,12 +315,14 @@ std::string config_reference() {
   for (const auto& section : config_schema()) {
     text += heading(section);
     if (section.keys.empty()) continue;
+    if (section.add_entry) section.add_entry(defaults, {});
     text += "| key | unit | allowed | default | meaning |\n|---|---|---|---|---|\n";
     for (const auto& spec : section.keys) {
       const Slot slot = spec.slot(defaults);
       const std::string value = value_text(slot);
+      const bool none = value.empty() || value == "nan";
       text += fmt::format("| `{}` | {} | {} | {} | {} |\n", spec.key, spec.unit,
-                          type_text(spec, slot), value.empty() ? "" : "`" + value + "`", spec.help);
+                          type_text(spec, slot), none ? "" : "`" + value + "`", spec.help);
     }
     text += "\n";
   }
@@ -274,6 +341,7 @@ std::vector<EffectiveValue> effective_values(const MissionConfig& config) {
   };
   for (const auto& section : config_schema())
     for (const auto& spec : section.keys) {
+      if (section.file == ConfigFile::plan) continue;  // As many as there are stations.
       const auto path = member_path(section, spec.key);
       values.push_back({path, value_text(spec.slot(copy)), spec.unit, origin(path)});
     }

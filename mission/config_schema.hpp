@@ -1,5 +1,5 @@
-// The one table of every key a mission or robot file may have. Reading, "did you mean", the summary
-// of `vantage check` and the reference in configs/README.md all come from it.
+// The one table of every key a mission, robot or plan file may have. Reading, "did you mean", the
+// summary of `vantage check` and the reference in configs/README.md all come from it.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +14,8 @@
 
 namespace mission {
 
-enum class ConfigFile { mission, robot };
-std::string_view name(ConfigFile file);  // "mission" or "robot"
+enum class ConfigFile { mission, robot, plan };
+std::string_view name(ConfigFile file);  // "mission", "robot" or "plan"
 
 // Where a key's value lives in a MissionConfig. Its type says what the key accepts.
 using Slot =
@@ -38,6 +38,8 @@ struct SectionSpec {
   std::vector<KeySpec> keys;
   // [regions] only: keys are free, values are among these.
   std::vector<std::string> entry_choices;
+  // [[name]] only: adds one more entry, written there, which the slots mean from then on.
+  std::function<void(MissionConfig&, const ConfigPlace&)> add_entry = nullptr;
 };
 
 const std::vector<SectionSpec>& config_schema();

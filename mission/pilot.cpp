@@ -9,6 +9,7 @@ namespace mission {
 namespace {
 
 constexpr hal::Duration kControlPeriod = std::chrono::milliseconds(50);
+constexpr hal::Duration kHaltWait = std::chrono::seconds(2);
 constexpr double kObstacleAheadM = 0.35;  // Beyond the bumper, when something was touched.
 constexpr double kTouchedSideM = 0.6;     // Square that is closed around the spot.
 constexpr double kBackOffM = 0.5;
@@ -25,6 +26,20 @@ nav::LocalizerConfig localizer_config(const RobotConfig& robot) {
   return config;
 }
 
+// Three times what the way should take, and a minute.
+hal::Duration time_allowed(const BodyConfig& body, const nav::Route& route) {
+  return hal::from_seconds(60 + 3 * route.length_m / body.speed_max_mps +
+                           static_cast<double>(route.points_m.size()) * 2 * std::numbers::pi /
+                               radians(body.turn_max_degps));
+}
+
+// The start pose comes from survey marks or the operator's care: a few centimetres, a degree.
+Eigen::Matrix3d start_covariance() {
+  return Eigen::Vector3d{0.05 * 0.05, 0.05 * 0.05, radians(1) * radians(1)}.asDiagonal();
+}
+
+}  // namespace
+
 nav::FollowConfig follow_config(const BodyConfig& body) {
   nav::FollowConfig config;
   config.speed_max_mps = body.speed_max_mps;
@@ -34,12 +49,22 @@ nav::FollowConfig follow_config(const BodyConfig& body) {
   return config;
 }
 
-// The start pose comes from survey marks or the operator's care: a few centimetres, a degree.
-Eigen::Matrix3d start_covariance() {
-  return Eigen::Vector3d{0.05 * 0.05, 0.05 * 0.05, radians(1) * radians(1)}.asDiagonal();
+double drive_time_s(const BodyConfig& body, const nav::Route& route, hal::Pose2 from,
+                    hal::Pose2 to) {
+  const nav::FollowConfig config = follow_config(body);
+  const nav::Path path = nav::path_along(route, to.heading_rad);
+  const double late_s = hal::seconds(time_allowed(body, route));
+  nav::FollowState state;
+  double time_s = 0;
+  for (; time_s < late_s; time_s += config.period_s) {
+    const hal::Twist twist = nav::follow(config, state, path, from);
+    if (nav::done(state)) break;
+    from.heading_rad += twist.turn_radps * config.period_s;
+    from.position_m += twist.forward_mps * config.period_s *
+                       Eigen::Vector2d(std::cos(from.heading_rad), std::sin(from.heading_rad));
+  }
+  return time_s + hal::seconds(kHaltWait);
 }
-
-}  // namespace
 
 Pilot::Pilot(const RobotConfig& config, hal::Clock& clock, hal::Devices& devices, hal::Pose2 start)
     : config_(config),
@@ -99,19 +124,12 @@ hal::Task<LegEnd> Pilot::drive_to(Roads& roads, hal::Pose2 goal) {
   co_return leg;
 }
 
-// Three times what the way should take, and a minute.
-hal::Duration Pilot::time_allowed(const nav::Route& route) const {
-  return hal::from_seconds(60 + 3 * route.length_m / config_.body.speed_max_mps +
-                           static_cast<double>(route.points_m.size()) * 2 * std::numbers::pi /
-                               radians(config_.body.turn_max_degps));
-}
-
 hal::Task<Pilot::RouteEnd> Pilot::follow_route(const nav::Route& route, hal::Pose2 goal,
                                                LegEnd& leg) {
   const nav::FollowConfig config = follow_config(config_.body);
   const nav::Path path = nav::path_along(route, goal.heading_rad);
   nav::FollowState state;
-  const hal::Time late = clock_.now() + time_allowed(route);
+  const hal::Time late = clock_.now() + time_allowed(config_.body, route);
   RouteEnd end = RouteEnd::given_up;
   leg.reason = "the robot did not get there in the time allowed";
   while (clock_.now() < late) {
@@ -135,7 +153,7 @@ hal::Task<Pilot::RouteEnd> Pilot::follow_route(const nav::Route& route, hal::Pos
 // Stops, and waits until the robot stands still.
 hal::Task<void> Pilot::halt() {
   (co_await devices_.drive.command({})).value();
-  co_await clock_.sleep_for(std::chrono::seconds(2));
+  co_await clock_.sleep_for(kHaltWait);
 }
 
 hal::Task<void> Pilot::back_off() {

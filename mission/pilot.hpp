@@ -24,6 +24,14 @@ struct LegEnd {
   std::vector<Eigen::Vector2d> track_m;  // Believed positions, about one per metre.
 };
 
+// How a robot of this body follows paths.
+nav::FollowConfig follow_config(const BodyConfig& body);
+
+// How long it takes along the route, from pose to pose and until it stands: the follower at work on
+// a robot that does exactly as told.
+double drive_time_s(const BodyConfig& body, const nav::Route& route, hal::Pose2 from,
+                    hal::Pose2 to);
+
 class Pilot {
  public:
   Pilot(const RobotConfig& config, hal::Clock& clock, hal::Devices& devices, hal::Pose2 start);
@@ -50,7 +58,6 @@ class Pilot {
   hal::Task<RouteEnd> follow_route(const nav::Route& route, hal::Pose2 goal, LegEnd& leg);
   hal::Task<void> back_off();
   hal::Task<void> halt();
-  hal::Duration time_allowed(const nav::Route& route) const;
   void note_track(LegEnd& leg) const;
 
   const RobotConfig config_;

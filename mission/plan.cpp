@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 
+#include "mission/plan_file.hpp"
 #include "nav/polygons.hpp"
 #include "planning/tour.hpp"
 
@@ -64,6 +65,8 @@ Eigen::Vector2d roomy_point(const nav::FreeArea& area) {
 AreaMode mode_of(const MissionConfig& config, const nav::FreeArea& area, bool is_home) {
   if (const auto named = mode_named(config, area.region)) return *named;
   if (is_home) return AreaMode::robot;
+  if (!config.plan.stations.empty())
+    return stations_in(config.plan, area.name).empty() ? AreaMode::skip : AreaMode::manual;
   return nav::area_m2(area.standable) >= kManualAreaMinM2 ? AreaMode::manual : AreaMode::skip;
 }
 
@@ -79,8 +82,22 @@ void order_tasks(SiteTasks& tasks, int home) {
   tasks.tasks = std::move(sorted);
 }
 
-hal::Pose2 pose_of(const planning::Candidate& candidate) {
-  return {nav::to_m(candidate.position), candidate.heading_rad};
+planning::Candidate candidate_at(const SavedStation& station) {
+  return {nav::to_mm(Eigen::Vector2d(station.x_m, station.y_m)),
+          station.heading_deg * std::numbers::pi / 180};
+}
+
+// Searches the area's stations, or takes them from the plan file.
+void choose_stations(const MissionConfig& config, std::uint64_t seed, int threads, AreaPlan& plan) {
+  planning::CoverConfig cover = cover_config(config.phase1);
+  const auto saved = stations_in(config.plan, plan.area.name);
+  if (!config.plan.stations.empty()) {
+    cover.given.emplace();
+    for (const SavedStation& station : saved) cover.given->push_back(candidate_at(station));
+  }
+  plan.cover = planning::plan_cover(plan.area, plan.walls, sensor_limits(config.robot.scanner),
+                                    cover, seed, threads);
+  for (const SavedStation& station : saved) plan.names.push_back(station.name);
 }
 
 // Costs between all stops in metres of road; infinite where no road leads.
@@ -128,11 +145,12 @@ SiteTasks assign_areas(const MissionConfig& config, const nav::SiteMap& map,
     const AreaMode mode = mode_of(config, areas[i], static_cast<int>(i) == home);
     result.tasks.push_back({areas[i], mode});
     if (mode_named(config, areas[i].region) || static_cast<int>(i) == home) continue;
+    const std::string_view why = mode == AreaMode::manual ? "a person carries the scanner there"
+                                 : config.plan.stations.empty()
+                                     ? "too small to carry a scanner into; left out"
+                                     : "the plan file has no station there; left out";
     result.notes.push_back(fmt::format("area '{}' ({:.0f} m2) is not connected to the robot's: {}",
-                                       areas[i].name, nav::area_m2(areas[i].standable),
-                                       mode == AreaMode::manual
-                                           ? "a person carries the scanner there"
-                                           : "too small to carry a scanner into; left out"));
+                                       areas[i].name, nav::area_m2(areas[i].standable), why));
   }
   order_tasks(result, home);
   if (map.start) {
@@ -161,10 +179,17 @@ planning::CoverConfig cover_config(const Phase1Config& phase1) {
           .candidates = phase1.candidates,
           .coverage_goal = phase1.coverage_goal,
           .gain_min = phase1.gain_min,
-          .overlap_min = phase1.overlap_min};
+          .overlap_min = phase1.overlap_min,
+          .given = std::nullopt};
+}
+
+hal::Pose2 pose_of(const planning::Candidate& candidate) {
+  return {nav::to_m(candidate.position), candidate.heading_rad};
 }
 
 std::string station_name(const AreaPlan& plan, int station) {
+  const auto i = static_cast<std::size_t>(station);
+  if (i < plan.names.size() && !plan.names[i].empty()) return plan.names[i];
   return fmt::format("{} {}", plan.area.name, station + 1);
 }
 
@@ -177,11 +202,22 @@ PlannedArea plan_area(const MissionConfig& config, const nav::SiteMap& map, cons
   plan.area = task.area;
   plan.mode = task.mode == AreaMode::robot ? "robot" : "manual";
   plan.walls = planning::walls_of(map, task.area);
-  plan.cover = planning::plan_cover(task.area, plan.walls, sensor_limits(config.robot.scanner),
-                                    cover_config(config.phase1), seed, threads);
+  choose_stations(config, seed, threads, plan);
   plan.roadmap_m = planned.roads.roadmap().polylines();
   plan_tour(planned, start_m, config.return_home && task.mode == AreaMode::robot);
   return planned;
+}
+
+std::vector<PlannedArea> plan_areas(const MissionConfig& config, const nav::SiteMap& map,
+                                    const SiteTasks& tasks, int threads) {
+  std::vector<PlannedArea> areas;
+  for (std::size_t t = 0; t < tasks.tasks.size(); ++t) {
+    if (tasks.tasks[t].mode == AreaMode::skip) continue;
+    std::optional<Eigen::Vector2d> start_m;
+    if (static_cast<int>(t) == tasks.start_area) start_m = tasks.start.position_m;
+    areas.push_back(plan_area(config, map, tasks.tasks[t], start_m, config.seed + t, threads));
+  }
+  return areas;
 }
 
 }  // namespace mission

@@ -28,8 +28,8 @@ struct SiteTasks {
 
 // Decides who scans which area. Regions named in the mission get what it says; where it is silent,
 // the robot takes the area it stands in and a person carries the scanner into the others that are
-// at least manual_area_min_m2 large. Without a start in the map the robot is assumed at a point of
-// the largest robot area, and a note says so.
+// at least manual_area_min_m2 large (with a plan file: that it has stations in). Without a start in
+// the map the robot is assumed at a point of the largest robot area, and a note says so.
 SiteTasks assign_areas(const MissionConfig& config, const nav::SiteMap& map,
                        const std::vector<nav::FreeArea>& areas);
 
@@ -39,9 +39,9 @@ struct PlannedArea {
   std::vector<DroppedStation> unreachable;  // Planned, but no road leads there from the start.
 };
 
-// Plans one area (paper, Algorithm 1 and section 5.2.1). `start` is where the robot stands; empty
-// for a person, whose tour then begins at the first station. The tour is closed when
-// config.return_home is set and the robot drives it.
+// Plans one area (paper, Algorithm 1 and section 5.2.1), or takes its stations from config.plan.
+// `start` is where the robot stands; empty for a person, whose tour then begins at the first
+// station. The tour is closed when config.return_home is set and the robot drives it.
 PlannedArea plan_area(const MissionConfig& config, const nav::SiteMap& map, const AreaTask& task,
                       const std::optional<Eigen::Vector2d>& start_m, std::uint64_t seed,
                       int threads);
@@ -50,6 +50,13 @@ PlannedArea plan_area(const MissionConfig& config, const nav::SiteMap& map, cons
 planning::SensorLimits sensor_limits(const ScannerConfig& scanner);
 planning::CoverConfig cover_config(const Phase1Config& phase1);
 
+hal::Pose2 pose_of(const planning::Candidate& candidate);
+
+// "inner 3", or as the plan file calls it.
 std::string station_name(const AreaPlan& plan, int station);
+
+// Every area that is scanned, in the order of the tasks; each draws with its own seed.
+std::vector<PlannedArea> plan_areas(const MissionConfig& config, const nav::SiteMap& map,
+                                    const SiteTasks& tasks, int threads);
 
 }  // namespace mission

@@ -68,8 +68,10 @@ struct AreaPlan {
   std::string mode;  // "robot" or "manual"
   std::vector<planning::Wall> walls;
   planning::CoverPlan cover;
-  std::vector<int> tour;  // Order in which cover.stations are visited.
+  std::vector<std::string> names;  // Of cover.stations, as a plan file calls them; else empty.
+  std::vector<int> tour;           // Order in which cover.stations are visited.
   double tour_m{};
+  std::vector<std::vector<Eigen::Vector2d>> way_m;      // Of the tour, leg by leg; empty: unknown.
   std::vector<std::vector<Eigen::Vector2d>> roadmap_m;  // Polylines of the Voronoi roadmap.
 };
 
@@ -126,13 +128,16 @@ struct RunRecord {
   std::vector<DroppedStation> dropped;
   std::vector<std::vector<Eigen::Vector2d>> driven_m;  // Believed tracks, one per leg.
   ScannerConfig scanner;
+  double radius_m{};  // Of the robot.
+  double margin_m{};  // MissionConfig::margin_m
   planning::VoxelGrid grid;
   double voxel_m{};
   int gain_min_voxels{};
   GnssCounts gnss;
   double mission_s{};
   double driven_total_m{};
-  std::string end;  // Why it ended, in words.
+  std::vector<std::uint64_t> set_aside;  // SiteModel::voxels_set_aside at the end.
+  std::string end;                       // Why it ended, in words.
   bool completed{};
   std::optional<Leftover> leftover;
   DensityFacts density;

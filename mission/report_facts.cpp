@@ -114,6 +114,24 @@ bool continues(const AreaPlan& plan, const Gap& before, const Gap& after) {
          after.piece.from_m <= kSame_m;
 }
 
+AreaFacts places_in_tour(const AreaPlan& plan) {
+  AreaFacts facts;
+  facts.scan_of_station.assign(plan.cover.stations.size(), -1);
+  facts.place_in_tour.assign(plan.cover.stations.size(), 0);
+  for (std::size_t i = 0; i < plan.tour.size(); ++i) {
+    facts.place_in_tour.at(static_cast<std::size_t>(plan.tour[i])) = static_cast<int>(i) + 1;
+  }
+  return facts;
+}
+
+// From the pieces in facts.covered, which may overlap.
+AreaFacts sum_up(const AreaPlan& plan, AreaFacts facts) {
+  facts.covered = united(std::move(facts.covered));
+  for (const WallPiece& piece : facts.covered) facts.covered_m += piece.to_m - piece.from_m;
+  facts.gaps = gaps_of(plan, facts.covered);
+  return facts;
+}
+
 }  // namespace
 
 Eigen::Vector2d wall_point_m(const planning::Wall& wall, double along_m) {
@@ -123,20 +141,23 @@ Eigen::Vector2d wall_point_m(const planning::Wall& wall, double along_m) {
 }
 
 AreaFacts area_facts(const RunRecord& record, const AreaPlan& plan) {
-  AreaFacts facts;
-  facts.place_in_tour.assign(plan.cover.stations.size(), 0);
-  for (std::size_t i = 0; i < plan.tour.size(); ++i) {
-    facts.place_in_tour.at(static_cast<std::size_t>(plan.tour[i])) = static_cast<int>(i) + 1;
-  }
-  for (const planning::Station& station : plan.cover.stations) {
-    facts.scan_of_station.push_back(scan_of(record, plan, station));
-    if (facts.scan_of_station.back() < 0) continue;
+  AreaFacts facts = places_in_tour(plan);
+  for (std::size_t i = 0; i < plan.cover.stations.size(); ++i) {
+    const planning::Station& station = plan.cover.stations[i];
+    facts.scan_of_station[i] = scan_of(record, plan, station);
+    if (facts.scan_of_station[i] < 0) continue;
     facts.covered.insert(facts.covered.end(), station.sees.begin(), station.sees.end());
   }
-  facts.covered = united(std::move(facts.covered));
-  for (const WallPiece& piece : facts.covered) facts.covered_m += piece.to_m - piece.from_m;
-  facts.gaps = gaps_of(plan, facts.covered);
-  return facts;
+  return sum_up(plan, std::move(facts));
+}
+
+AreaFacts planned_facts(const AreaPlan& plan) {
+  AreaFacts facts = places_in_tour(plan);
+  for (const int station : plan.tour) {
+    const auto& sees = plan.cover.stations[static_cast<std::size_t>(station)].sees;
+    facts.covered.insert(facts.covered.end(), sees.begin(), sees.end());
+  }
+  return sum_up(plan, std::move(facts));
 }
 
 std::vector<GapStretch> gap_stretches(const AreaPlan& plan, const std::vector<Gap>& gaps) {

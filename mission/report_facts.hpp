@@ -36,6 +36,9 @@ struct AreaFacts {
 
 AreaFacts area_facts(const RunRecord& record, const AreaPlan& plan);
 
+// The same as though every station of the tour were scanned; scan_of_station is -1 all the same.
+AreaFacts planned_facts(const AreaPlan& plan);
+
 // The area's gaps joined where they continue, longest first.
 std::vector<GapStretch> gap_stretches(const AreaPlan& plan, const std::vector<Gap>& gaps);
 

@@ -6,66 +6,30 @@
 #include <limits>
 #include <map>
 
+#include "mission/drawing.hpp"
+#include "mission/plan.hpp"
 #include "mission/report_html.hpp"
 #include "mission/report_parts.hpp"
 
 namespace mission::report {
 namespace {
 
+using drawing::append_point;
+using drawing::drawn;
+using drawing::Legend;
+using drawing::legend_area;
+using drawing::legend_line;
+using drawing::LegendItem;
+using drawing::line_path;
+using drawing::polygons_path;
+using drawing::View;
 using Eigen::Vector2d;
 using html::escaped;
 
-constexpr double kWidthMax_px = 1060, kHeightMax_px = 940, kMargin_px = 16, kFoot_px = 46;
 constexpr std::size_t kTints = 6;
 
-// From metres in W (y up) to the SVG's pixels (y down).
-class View {
- public:
-  View(const Vector2d& low_m, const Vector2d& high_m) : low_m_(low_m), high_m_(high_m) {
-    const Vector2d size_m = (high_m - low_m).cwiseMax(1e-3);
-    scale_ = std::min((kWidthMax_px - 2 * kMargin_px) / size_m.x(),
-                      (kHeightMax_px - 2 * kMargin_px) / size_m.y());
-    width_ = std::max(size_m.x() * scale_ + 2 * kMargin_px, 360.0);
-    height_ = size_m.y() * scale_ + 2 * kMargin_px + kFoot_px;
-  }
-
-  Vector2d px(const Vector2d& at_m) const {
-    return {(width_ - (high_m_ - low_m_).x() * scale_) / 2 + (at_m.x() - low_m_.x()) * scale_,
-            kMargin_px + (high_m_.y() - at_m.y()) * scale_};
-  }
-  double width() const { return width_; }
-  double height() const { return height_; }
-  double px_per_m() const { return scale_; }
-
- private:
-  Vector2d low_m_, high_m_;
-  double scale_{}, width_{}, height_{};
-};
-
-class Box {
- public:
-  void add(const Vector2d& at_m) {
-    low_ = low_.cwiseMin(at_m);
-    high_ = high_.cwiseMax(at_m);
-  }
-  void add(const nav::Polygons& polygons) {
-    for (const auto& polygon : polygons) {
-      for (const auto& point : polygon.outer) add(nav::to_m(point));
-    }
-  }
-  bool empty() const { return low_.x() > high_.x(); }
-  View view() const {
-    if (empty()) return {{0, 0}, {1, 1}};
-    return {low_, high_};
-  }
-
- private:
-  Vector2d low_ = Vector2d::Constant(std::numeric_limits<double>::infinity());
-  Vector2d high_ = Vector2d::Constant(-std::numeric_limits<double>::infinity());
-};
-
 View view_of(const RunRecord& run) {
-  Box box;
+  drawing::Box box;
   box.add(run.map.boundary);
   box.add(run.map.obstacles);
   for (const auto& region : run.map.regions) box.add(region.area);
@@ -73,48 +37,6 @@ View view_of(const RunRecord& run) {
   for (const ScanRecord& scan : run.scans) box.add(scan.believed.position_m);
   for (const DroppedStation& station : run.dropped) box.add(station.planned.position_m);
   return box.view();
-}
-
-void append_point(std::string& path, char command, const Vector2d& px) {
-  fmt::format_to(std::back_inserter(path), "{}{:.1f} {:.1f}", command, px.x(), px.y());
-}
-
-std::string ring_path(const nav::Ring& ring, const View& view) {
-  std::string path;
-  for (std::size_t i = 0; i < ring.size(); ++i) {
-    append_point(path, i == 0 ? 'M' : 'L', view.px(nav::to_m(ring[i])));
-  }
-  return path.empty() ? path : path + "Z";
-}
-
-std::string polygons_path(const nav::Polygons& polygons, const View& view) {
-  std::string path;
-  for (const auto& polygon : polygons) {
-    path += ring_path(polygon.outer, view);
-    for (const auto& hole : polygon.holes) path += ring_path(hole, view);
-  }
-  return path;
-}
-
-// Points closer than a pixel to the last one drawn are left out, the last one stays.
-std::string line_path(const std::vector<Vector2d>& line_m, const View& view) {
-  std::string path;
-  Vector2d last_px(0, 0);
-  for (std::size_t i = 0; i < line_m.size(); ++i) {
-    const Vector2d px = view.px(line_m[i]);
-    if (i > 0 && i + 1 < line_m.size() && (px - last_px).norm() < 1) continue;
-    append_point(path, i == 0 ? 'M' : 'L', px);
-    last_px = px;
-  }
-  return path;
-}
-
-std::string drawn(const std::string& path, std::string_view css_class,
-                  const std::string& tip = {}) {
-  if (path.empty()) return "";
-  const std::string title = tip.empty() ? "" : html::element("title", tip);
-  return fmt::format("<path d=\"{}\" class=\"{}\" fill-rule=\"evenodd\">{}</path>\n", path,
-                     css_class, title);
 }
 
 std::string piece_path(const AreaPlan& plan, const planning::WallPiece& piece, const View& view) {
@@ -161,7 +83,8 @@ std::string ways(const RunRecord& run, const View& view) {
     for (const int station : plan.tour) {
       tour.push_back(nav::to_m(plan.cover.stations[static_cast<std::size_t>(station)].at.position));
     }
-    tours += line_path(tour, view);
+    if (plan.way_m.empty()) tours += line_path(tour, view);
+    for (const auto& leg : plan.way_m) tours += line_path(leg, view);
   }
   for (const auto& leg : run.driven_m) driven += line_path(leg, view);
   // Before anything was driven the order of the stations is all there is.
@@ -226,8 +149,7 @@ std::vector<Badge> planned_badges(const RunRecord& run, const View& view) {
       const auto& at = plan.cover.stations[static_cast<std::size_t>(station)].at;
       const Vector2d px = view.px(nav::to_m(at.position));
       result.push_back({px, px, plan.mode == "manual" ? Shape::hand : Shape::robot,
-                        std::to_string(++number),
-                        fmt::format("{} {}", escaped(plan.area.name), station + 1)});
+                        std::to_string(++number), escaped(station_name(plan, station))});
     }
   }
   return result;
@@ -316,110 +238,87 @@ std::string signs(const RunRecord& run, const View& view) {
   return out;
 }
 
-// 1, 2 or 5 times a power of ten, about a sixth of the map's width.
-double scale_length_m(const View& view) {
-  const double wanted_m = view.width() / 6 / view.px_per_m();
-  const double power = std::pow(10.0, std::floor(std::log10(wanted_m)));
-  return wanted_m >= 5 * power ? 5 * power : wanted_m >= 2 * power ? 2 * power : power;
+LegendItem legend_sign(Shape shape, const std::string& words) {
+  return {"<g transform=\"translate(15 9) scale(0.75)\">" + shape_svg(shape, {0, 0}) + "</g>",
+          words};
 }
 
-std::string scale_and_north(const View& view) {
-  const double y = view.height() - 16, length_m = scale_length_m(view);
-  const double right = kMargin_px + length_m * view.px_per_m();
-  const double north = view.width() - kMargin_px - 10;
-  return fmt::format(
-      "<path d=\"M{0} {1:.1f}v6H{2:.1f}v-6\" class=\"scale\"/><text x=\"{3:.1f}\" "
-      "y=\"{4:.1f}\">{5} "
-      "m</text>\n<path d=\"M{6:.1f} {7:.1f}l6 20l-6 -5l-6 5Z\" class=\"needle\"/><text "
-      "x=\"{6:.1f}\" "
-      "y=\"{8:.1f}\" text-anchor=\"middle\">N</text>\n",
-      kMargin_px, y - 6, right, right + 8, y + 3, length_m, north, y - 22, y + 12);
-}
-
-std::string legend_item(const std::string& svg, const std::string& words) {
-  return "<li><svg viewBox=\"0 0 30 18\">" + svg + "</svg>" + words + "</li>\n";
-}
-
-std::string legend_line(std::string_view css_class, const std::string& words) {
-  return legend_item(fmt::format("<path d=\"M2 9H28\" class=\"{}\"/>", css_class), words);
-}
-
-std::string legend_area(std::string_view css_class, const std::string& words) {
-  return legend_item(
-      fmt::format("<rect x=\"2\" y=\"2\" width=\"26\" height=\"14\" class=\"{}\"/>", css_class),
-      words);
-}
-
-std::string legend_sign(Shape shape, const std::string& words) {
-  return legend_item(
-      "<g transform=\"translate(15 9) scale(0.75)\">" + shape_svg(shape, {0, 0}) + "</g>", words);
-}
-
-std::string legend_ground(const RunRecord& run) {
-  std::string out;
+void add_ground(const RunRecord& run, Legend& legend) {
   for (const auto& [region, tint] : tints(run)) {
     const auto planned = [&name = region](const AreaPlan& p) { return p.area.region == name; };
     const auto plan = std::find_if(run.plans.begin(), run.plans.end(), planned);
     if (plan == run.plans.end()) {
-      out += legend_area("unplanned", escaped(region) + " (not scanned)");
+      legend.push_back(legend_area("unplanned", escaped(region) + " (not scanned)"));
     } else {
-      out += legend_area(fmt::format("free f{}", tint),
-                         escaped(region) + (plan->mode == "manual" ? " (by hand)" : ""));
+      legend.push_back(legend_area(fmt::format("free f{}", tint),
+                                   escaped(region) + (plan->mode == "manual" ? " (by hand)" : "")));
     }
   }
-  if (!run.map.obstacles.empty()) out += legend_area("solid", "obstacle");
-  if (!run.map.keep_out.empty()) out += legend_area("keep-out", "keep-out");
-  return out;
+  if (!run.map.obstacles.empty()) legend.push_back(legend_area("solid", "obstacle"));
+  if (!run.map.keep_out.empty()) legend.push_back(legend_area("keep-out", "keep-out"));
 }
 
-std::string legend_signs(const RunRecord& run) {
+void add_signs(const RunRecord& run, Legend& legend) {
   const auto any = [&run](auto test) {
     return std::any_of(run.scans.begin(), run.scans.end(), test);
   };
-  std::string out = legend_sign(Shape::robot, "station, numbered by scan");
-  if (any([](const ScanRecord& s) { return s.by_hand && !s.next_best_view; })) {
-    out += legend_sign(Shape::hand, "station, set up by hand");
-  }
-  if (any([](const ScanRecord& s) { return s.next_best_view; })) {
-    out += legend_sign(Shape::view, "next best view");
-  }
-  if (!run.dropped.empty()) out += legend_sign(Shape::dropped, "dropped station");
-  if (run.map.start) {
-    out += legend_item("<path d=\"M15 1l9 9h-3v7h-12v-7h-3Z\" class=\"start\"/>", "start");
-  }
-  return out;
+  const auto by_hand = [](const ScanRecord& s) { return s.by_hand && !s.next_best_view; };
+  const bool plan_by_hand =
+      run.scans.empty() && std::any_of(run.plans.begin(), run.plans.end(), [](const AreaPlan& p) {
+        return p.mode == "manual" && !p.tour.empty();
+      });
+  legend.push_back(legend_sign(Shape::robot, run.scans.empty() ? "station, numbered as visited"
+                                                               : "station, numbered by scan"));
+  if (any(by_hand) || plan_by_hand)
+    legend.push_back(legend_sign(Shape::hand, "station, set up by hand"));
+  if (any([](const ScanRecord& s) { return s.next_best_view; }))
+    legend.push_back(legend_sign(Shape::view, "next best view"));
+  if (!run.dropped.empty()) legend.push_back(legend_sign(Shape::dropped, "dropped station"));
+  if (run.map.start)
+    legend.push_back({"<path d=\"M15 1l9 9h-3v7h-12v-7h-3Z\" class=\"start\"/>", "start"});
 }
 
-std::string legend(const RunRecord& run) {
+Legend legend_of(const RunRecord& run) {
   const bool has_other = std::any_of(run.plans.begin(), run.plans.end(), [](const AreaPlan& plan) {
     return std::any_of(plan.walls.begin(), plan.walls.end(),
                        [](const planning::Wall& wall) { return !wall.target; });
   });
-  std::string out = legend_line("covered", "wall covered") + legend_line("missed", "not covered");
-  if (has_other) out += legend_line("other", "wall that does not count");
-  out += legend_line("road", "roadmap");
-  out += run.driven_m.empty() ? legend_line("tour", "order of the stations")
-                              : legend_line("driven", "driven");
-  return "<ul class=\"legend\">\n" + legend_signs(run) + out + legend_ground(run) + "</ul>\n";
+  Legend legend;
+  add_signs(run, legend);
+  legend.push_back(legend_line("covered", "wall covered"));
+  legend.push_back(legend_line("missed", "not covered"));
+  if (has_other) legend.push_back(legend_line("other", "wall that does not count"));
+  legend.push_back(legend_line("road", "roadmap"));
+  const bool way_known = std::any_of(run.plans.begin(), run.plans.end(),
+                                     [](const AreaPlan& p) { return !p.way_m.empty(); });
+  legend.push_back(run.driven_m.empty() ? legend_line("tour", way_known ? "way of the tour"
+                                                                        : "order of the stations")
+                                        : legend_line("driven", "driven"));
+  add_ground(run, legend);
+  return legend;
 }
 
-constexpr std::string_view kHatch =
-    "<defs><pattern id=\"hatch\" width=\"7\" height=\"7\" patternUnits=\"userSpaceOnUse\" "
-    "patternTransform=\"rotate(45)\"><line x1=\"0\" y1=\"0\" x2=\"0\" y2=\"7\" "
-    "class=\"hatch\"/></pattern></defs>\n";
+std::string layers(const Facts& facts, const View& view) {
+  const RunRecord& run = facts.record;
+  return ground(run, view) + ways(run, view) + walls(facts, view) + signs(run, view);
+}
 
 }  // namespace
 
 std::string site_map(const Facts& facts) {
-  const RunRecord& run = facts.record;
-  const View view = view_of(run);
-  std::string out = fmt::format(
-      "<svg viewBox=\"0 0 {0:.0f} {1:.0f}\" style=\"max-width: {0:.0f}px\" role=\"img\" "
-      "aria-label=\"Site map\">\n",
-      view.width(), view.height());
-  out += kHatch;
-  out += ground(run, view) + ways(run, view) + walls(facts, view) + signs(run, view);
-  return out + scale_and_north(view) + "</svg>\n" + legend(run);
+  const View view = view_of(facts.record);
+  return drawing::figure(view, "Site map", layers(facts, view)) +
+         drawing::legend_html(legend_of(facts.record));
+}
+
+std::string site_map_svg(const Facts& facts, const std::string& title,
+                         const std::string& subtitle) {
+  const View view = view_of(facts.record);
+  return drawing::document(view, {.title = title,
+                                  .subtitle = subtitle,
+                                  .body = layers(facts, view),
+                                  .legend = legend_of(facts.record),
+                                  .rules = ""});
 }
 
 }  // namespace mission::report

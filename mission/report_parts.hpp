@@ -17,10 +17,17 @@ struct Facts {
   Coverage all;
 
   explicit Facts(const RunRecord& run);
+  // As though every station of the tours were scanned.
+  static Facts as_planned(const RunRecord& run);
+
+ private:
+  Facts(const RunRecord& run, std::vector<AreaFacts> facts);
 };
 
-std::string_view style();                            // report_style.cpp
-std::string site_map(const Facts& facts);            // report_map.cpp: SVG and legend
+std::string style();                       // report_style.cpp
+std::string site_map(const Facts& facts);  // report_map.cpp: SVG and legend
+// The same as an SVG file of its own.
+std::string site_map_svg(const Facts& facts, const std::string& title, const std::string& subtitle);
 std::string voxel_curves(const RunRecord& run);      // report_charts.cpp: totals, and gain per scan
 std::string pose_error_chart(const RunRecord& run);  // report_charts.cpp; empty without truth
 

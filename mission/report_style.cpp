@@ -1,16 +1,10 @@
+#include "mission/drawing.hpp"
 #include "mission/report_parts.hpp"
 
 namespace mission::report {
+namespace {
 
-// Colours that stay apart for the colour-blind: covered blue, uncovered orange, driven green.
-std::string_view style() {
-  return R"(
-:root { color-scheme: light dark;
-  --page: #f6f7f9; --card: #ffffff; --ink: #1b2430; --soft: #5c6876; --line: #dde2e8;
-  --covered: #0b6fb8; --missed: #d9480f; --other: #8b95a1; --solid: #cfd5dc; --road: #a9a3c2;
-  --driven: #12805c; --view: #a3268f; --badge: #243244; --badge-ink: #ffffff;
-  --good: #12805c; --warn: #b45309; --alarm: #fdecea;
-  --r0: #5b8def; --r1: #e0a526; --r2: #4fae74; --r3: #b678d8; --r4: #e0736b; --r5: #3fb3c4; }
+constexpr std::string_view kPage = R"(
 @media (prefers-color-scheme: dark) { :root {
   --page: #12161b; --card: #1b2129; --ink: #e6eaf0; --soft: #9aa7b5; --line: #303945;
   --covered: #4ea8e8; --missed: #ff8a4c; --other: #788494; --solid: #3b4551; --road: #6d6790;
@@ -68,30 +62,9 @@ svg.chart { max-width: 620px; margin: 0; }
 .legend li { display: flex; align-items: center; gap: 7px; }
 .legend svg { width: 30px; height: 18px; flex: none; }
 .legend b { color: var(--ink); font-weight: 600; }
-.boundary { fill: none; stroke: var(--other); stroke-width: 1; stroke-dasharray: 7 4; }
-.solid { fill: var(--solid); }
-.hatch { stroke: var(--missed); stroke-width: 1.4; stroke-opacity: 0.65; }
-.keep-out { fill: url(#hatch); stroke: var(--missed); stroke-opacity: 0.65; stroke-width: 0.8; }
-.free { fill-opacity: 0.16; stroke: none; }
-.unplanned { fill: var(--other); fill-opacity: 0.1; }
-.f0 { fill: var(--r0); } .f1 { fill: var(--r1); } .f2 { fill: var(--r2); }
-.f3 { fill: var(--r3); } .f4 { fill: var(--r4); } .f5 { fill: var(--r5); }
-.road { fill: none; stroke: var(--road); stroke-width: 0.9; }
-.driven { fill: none; stroke: var(--driven); stroke-width: 1.9; stroke-linejoin: round; }
-.tour { fill: none; stroke: var(--driven); stroke-width: 1.4; stroke-dasharray: 5 4; }
-.other { fill: none; stroke: var(--other); stroke-width: 1.3; }
-.covered { fill: none; stroke: var(--covered); stroke-width: 2.8; }
-.missed { fill: none; stroke: var(--missed); stroke-width: 3.8; }
-.leader { stroke: var(--ink); stroke-width: 0.9; }
-.at { fill: var(--ink); }
-.station { fill: var(--badge); stroke: var(--card); stroke-width: 1.2; }
-.nbv { fill: var(--view); stroke: var(--card); stroke-width: 1.2; }
-svg .mark { fill: var(--badge-ink); font-size: 10.5px; font-weight: 700; text-anchor: middle; }
-.drop { fill: var(--card); stroke: var(--missed); stroke-width: 1.6; }
-.cross { stroke: var(--missed); stroke-width: 1.8; fill: none; }
-.start { fill: var(--driven); stroke: var(--card); stroke-width: 1.2; }
-.scale { fill: none; stroke: var(--ink); stroke-width: 1.6; }
-.needle { fill: var(--ink); }
+)";
+
+constexpr std::string_view kCharts = R"(
 .grid { stroke: var(--line); stroke-width: 1; }
 .axis { stroke: var(--soft); stroke-width: 1; }
 svg .tick { fill: var(--soft); font-size: 11px; }
@@ -115,6 +88,12 @@ footer { color: var(--soft); font-size: 13px; }
   .scroll { overflow: visible; } details::details-content { content-visibility: visible; }
   * { -webkit-print-color-adjust: exact; print-color-adjust: exact; } }
 )";
+
+}  // namespace
+
+std::string style() {
+  return ":root { color-scheme: light dark;\n" + std::string(drawing::palette()) + " }" +
+         std::string(kPage) + std::string(drawing::rules()) + std::string(kCharts);
 }
 
 }  // namespace mission::report

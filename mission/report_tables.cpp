@@ -147,11 +147,22 @@ std::string resolved_cell(const ScanRecord& scan) {
 
 }  // namespace
 
-Facts::Facts(const RunRecord& run) : record(run) {
-  for (const AreaPlan& plan : run.plans) {
-    areas.push_back(area_facts(run, plan));
-    all += coverage_of(plan, areas.back());
-  }
+Facts::Facts(const RunRecord& run, std::vector<AreaFacts> facts)
+    : record(run), areas(std::move(facts)) {
+  for (std::size_t i = 0; i < areas.size(); ++i) all += coverage_of(run.plans[i], areas[i]);
+}
+
+Facts::Facts(const RunRecord& run)
+    : Facts(run, [&run] {
+        std::vector<AreaFacts> facts;
+        for (const AreaPlan& plan : run.plans) facts.push_back(area_facts(run, plan));
+        return facts;
+      }()) {}
+
+Facts Facts::as_planned(const RunRecord& run) {
+  std::vector<AreaFacts> facts;
+  for (const AreaPlan& plan : run.plans) facts.push_back(planned_facts(plan));
+  return {run, std::move(facts)};
 }
 
 std::string voxel_table(const RunRecord& run) {

@@ -1,9 +1,13 @@
 #include "mission/site_model.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <span>
+#include <stdexcept>
+#include <utility>
 
 #include "nav/polygons.hpp"
 
@@ -53,6 +57,21 @@ int layers_kept(const MissionConfig& config, const planning::VoxelGrid& grid,
   return std::max(static_cast<int>(std::min(layers, most)), grid.nz);
 }
 
+void check_box(const planning::VoxelGrid& grid, const planning::VoxelGrid& wanted) {
+  const bool same = grid.voxel_m == wanted.voxel_m && grid.W_min_m == wanted.W_min_m &&
+                    grid.nx == wanted.nx && grid.ny == wanted.ny;
+  if (same) return;
+  const auto text = [](const planning::VoxelGrid& g) {
+    return fmt::format("{} x {} voxels of {} m from ({}, {}, {}) m", g.nx, g.ny, g.voxel_m,
+                       g.W_min_m.x(), g.W_min_m.y(), g.W_min_m.z());
+  };
+  throw std::invalid_argument(
+      fmt::format("the voxel map's box, {}, is not this mission's, {}; give the mission, the robot "
+                  "and the site "
+                  "that the map was made with",
+                  text(grid), text(wanted)));
+}
+
 }  // namespace
 
 planning::VoxelGrid voxel_grid(const MissionConfig& config, const nav::SiteMap& map,
@@ -78,13 +97,19 @@ planning::VoxelGrid voxel_grid(const MissionConfig& config, const nav::SiteMap& 
 
 SiteModel::SiteModel(const MissionConfig& config, const nav::SiteMap& map,
                      std::vector<AreaTask> tasks, int threads)
+    : SiteModel(config, map, tasks, threads,
+                planning::VoxelMap(voxel_grid(config, map, tasks),
+                                   layers_kept(config, voxel_grid(config, map, tasks), tasks))) {}
+
+SiteModel::SiteModel(const MissionConfig& config, const nav::SiteMap& map,
+                     std::vector<AreaTask> tasks, int threads, planning::VoxelMap seen)
     : config_(config),
       tasks_(std::move(tasks)),
       threads_(threads),
-      map_(voxel_grid(config, map, tasks_),
-           layers_kept(config, voxel_grid(config, map, tasks_), tasks_)),
+      map_(std::move(seen)),
       tally_(view_limits(config.robot.scanner), threads),
       density_(config.robot.scanner, config.phase2.density_min_ppm2, threads) {
+  check_box(map_.grid(), voxel_grid(config, map, tasks_));
   if (config_.phase2.foliage) beams_.emplace(map_);
   find_cells();
   const planning::VoxelGrid& grid = map_.grid();
@@ -102,6 +127,7 @@ SiteModel::SiteModel(const MissionConfig& config, const nav::SiteMap& map,
         nav::rasterize(nav::offset(task.area.drivable, -kKnownWallMarginMm), obstacle_grid_);
     for (std::size_t i = 0; i < open.size(); ++i) open_[i] |= open[i];
   }
+  find_boundary();
 }
 
 // Every voxel at scanner height whose centre is a place to stand.
@@ -322,6 +348,29 @@ std::uint64_t SiteModel::settle() {
   }
   expected_.clear();
   return resolved;
+}
+
+std::vector<std::uint64_t> SiteModel::voxels_set_aside() const {
+  const auto nx = static_cast<std::uint64_t>(map_.grid().nx);
+  const auto ny = static_cast<std::uint64_t>(map_.grid().ny);
+  std::vector<std::uint64_t> voxels;
+  for (const auto& [v, tries] : tries_)
+    if (tries >= kTriesMax)
+      voxels.push_back((static_cast<std::uint64_t>(v.z) * ny + static_cast<std::uint64_t>(v.y)) *
+                           nx +
+                       static_cast<std::uint64_t>(v.x));
+  std::ranges::sort(voxels);
+  return voxels;
+}
+
+void SiteModel::set_aside(const std::vector<std::uint64_t>& voxels) {
+  const auto nx = static_cast<std::uint64_t>(map_.grid().nx);
+  const auto ny = static_cast<std::uint64_t>(map_.grid().ny);
+  for (const std::uint64_t i : voxels) {
+    const planning::Voxel v{static_cast<int>(i % nx), static_cast<int>(i / nx % ny),
+                            static_cast<int>(i / nx / ny)};
+    if (std::exchange(tries_[v], kTriesMax) < kTriesMax) ++set_aside_;
+  }
 }
 
 void SiteModel::exclude(const planning::Voxel& cell) {

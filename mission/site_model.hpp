@@ -65,6 +65,10 @@ class SiteModel {
 
   SiteModel(const MissionConfig& config, const nav::SiteMap& map, std::vector<AreaTask> tasks,
             int threads);
+  // Goes on from what an earlier run has seen. Throws std::invalid_argument unless the map's box is
+  // voxel_grid() of the same arguments, but for its height.
+  SiteModel(const MissionConfig& config, const nav::SiteMap& map, std::vector<AreaTask> tasks,
+            int threads, planning::VoxelMap seen);
 
   // Merges a scan taken from the ground at ground_z_m; T_W_S is the scanner's believed pose and
   // W_points_m the scan's points seen from there (scan_points).
@@ -96,12 +100,21 @@ class SiteModel {
   std::uint64_t settle();
   std::uint64_t set_aside() const { return set_aside_; }
 
+  // The frontier within the site's boundary, less what is set aside: what tally() counts.
+  std::vector<planning::BoundaryVoxel> worth_seeing() const;
+
+  // Which voxels are set aside, as index x + nx (y + ny z), and the same taken up again.
+  std::vector<std::uint64_t> voxels_set_aside() const;
+  void set_aside(const std::vector<std::uint64_t>& voxels);
+
   // Never ask for a view from this cell again.
   void exclude(const planning::Voxel& cell);
 
   VoxelCounts counts() const;
   // Whether any view could still help, and what none can see (site_leftover.cpp). Several tallies.
   Leftover leftover() const;
+  // The boundary unseen voxels that leftover() counts as never visible.
+  std::vector<planning::Voxel> never_visible_voxels() const;
   DensityFacts density() const { return density_.facts(); }
   // Grows in z when at least kReturnsToGrow points lie in a layer above the box or higher, up to
   // [phase2] height_max_m. What is then in it, and everything derived from it, is as if the box had
@@ -130,9 +143,9 @@ class SiteModel {
   std::vector<NextView> faced(std::vector<NextView> views);
   std::vector<planning::Voxel> unseen_in_sight(const std::vector<planning::BoundaryVoxel>& worth,
                                                const planning::Voxel& cell) const;
+  std::vector<planning::Voxel> standing_cells() const;
   bool is_in_site(const planning::Voxel& v) const;
   bool is_set_aside(const planning::Voxel& v) const;
-  std::vector<planning::BoundaryVoxel> worth_seeing() const;
   void note_obstacle(const Eigen::Vector3f& W_point_m, double ground_z_m, ScanEffect& effect);
 
   const MissionConfig config_;

@@ -216,7 +216,10 @@ json::object summarise(const RunRecord& record, const ProductFacts& products) {
                        {"gain_min_voxels", record.gain_min_voxels},
                        {"gnss", gnss_json(record.gnss)}};
   summary["sensor"] = sensor_json(record.scanner);
+  summary["radius_m"] = record.radius_m;
+  summary["margin_m"] = record.margin_m;
   summary["grid"] = grid_json(record.grid);
+  summary["voxels_set_aside"] = json::value_from(record.set_aside);
   summary["counts"] = counts_json(record);
   summary["coverage"] = coverage_json(record);
   summary["voxels"] =

@@ -18,10 +18,6 @@ json::object pose_json(const hal::Pose2& pose) {
           {"heading_deg", pose.heading_rad * 180 / std::numbers::pi}};
 }
 
-hal::Pose2 pose_of(const planning::Candidate& at) {
-  return {nav::to_m(at.position), at.heading_rad};
-}
-
 // The scanner stands upright at its height above the ground.
 Eigen::Isometry3d scanner_pose(const hal::Pose2& pose, double ground_z_m, double height_m) {
   Eigen::Isometry3d T_W_S = Eigen::Isometry3d::Identity();
@@ -85,6 +81,8 @@ Survey::Survey(const MissionConfig& config, const nav::SiteMap& map, SiteTasks t
   record_.map = map;
   record_.notes = tasks_.notes;
   record_.scanner = config.robot.scanner;
+  record_.radius_m = config.robot.body.radius_m;
+  record_.margin_m = config.margin_m;
   record_.grid = model_.map().grid();
   layers_at_first_ = record_.grid.nz;
   record_.voxel_m = config.phase2.voxel_m;
@@ -104,6 +102,7 @@ hal::Task<void> Survey::run() {
   }
   record_.mission_s = now_s();
   note_gnss();
+  record_.set_aside = model_.voxels_set_aside();
   decide({{"t_s", now_s()},
           {"decision", "end"},
           {"completed", record_.completed},
@@ -157,12 +156,7 @@ void Survey::note_gnss() {
 }
 
 void Survey::plan_stations() {
-  for (std::size_t t = 0; t < tasks_.tasks.size(); ++t) {
-    const AreaTask& task = tasks_.tasks[t];
-    if (task.mode == AreaMode::skip) continue;
-    std::optional<Eigen::Vector2d> start_m;
-    if (static_cast<int>(t) == tasks_.start_area) start_m = tasks_.start.position_m;
-    PlannedArea planned = plan_area(config_, map_, task, start_m, config_.seed + t, threads_);
+  for (PlannedArea& planned : plan_areas(config_, map_, tasks_, threads_)) {
     json::object decision{{"t_s", now_s()}, {"decision", "stations"}};
     for (auto& [key, value] : plan_json(planned.plan)) decision[key] = value;
     decide(std::move(decision));

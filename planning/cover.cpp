@@ -101,6 +101,7 @@ void tell_left(const SpanSet& left, const SpanSet& covered, const GreedyCover& c
                const std::vector<std::vector<Span>>& views, const CoverRules& rules,
                std::vector<UncoveredPiece>& uncovered) {
   if (cover.end == CoverEnd::goal) return tell(left, Excluded::goal, uncovered);
+  if (cover.end == CoverEnd::given) return tell(left, Excluded::given, uncovered);
   SpanSet within_overlap(covered.walls());
   for (const auto& view : views) {
     const bool enough =
@@ -134,10 +135,26 @@ std::string in_words(const GreedyCover& cover, const CoverPlan& plan, const Cove
       return "Further views would add up to " + gain(cover.next_gain_refused_nm) +
              " of the target walls, but overlap the others by less than overlap_min (" +
              percent(config.overlap_min, 1) + "); covered is " + share + ".";
+    case CoverEnd::given:
+      return "The stations were given; covered is " + share + ".";
     case CoverEnd::all:
       break;
   }
   return "All that can be covered is covered.";
+}
+
+// The last `count` views, in their order, whatever they add.
+GreedyCover given_cover(const std::vector<std::vector<Span>>& views, std::size_t count,
+                        std::size_t walls) {
+  GreedyCover cover;
+  cover.end = CoverEnd::given;
+  SpanSet covered(walls);
+  for (std::size_t i = views.size() - count; i < views.size(); ++i) {
+    const std::int64_t overlaps_nm = covered.overlap_nm(views[i]);
+    cover.picks.push_back({static_cast<int>(i), length_nm(views[i]) - overlaps_nm, overlaps_nm});
+    covered.add(views[i]);
+  }
+  return cover;
 }
 
 Station station(const Candidate& at, const std::vector<Span>& view, const Pick& pick) {
@@ -155,6 +172,19 @@ std::string bound_in_words(std::size_t stations, int at_least) {
   return text + (static_cast<int>(stations) <= at_least
                      ? "no fewer will do."
                      : "at least " + std::to_string(at_least) + ".");
+}
+
+// The given stations, or those that the search finds. Of given ones the bound says how few would
+// cover as much.
+StationChoice chosen(const std::vector<std::vector<Span>>& views, std::size_t walls,
+                     CoverRules rules, const CoverConfig& config, std::uint64_t seed) {
+  const bool refine = config.method == CoverMethod::refined;
+  if (!config.given) return choose_stations(views, walls, rules, refine, seed);
+  GreedyCover given = given_cover(views, config.given->size(), walls);
+  rules.goal_nm = covered_nm(given);
+  StationChoice choice = choose_stations(views, walls, rules, false, seed);
+  choice.cover = std::move(given);
+  return choice;
 }
 
 // What they cover together.
@@ -189,6 +219,8 @@ CoverPlan plan_cover(const nav::FreeArea& area, const std::vector<Wall>& walls,
                      int threads) {
   CoverPlan plan;
   plan.candidates = draw_candidates(area, config.candidates, limits.fov_deg, seed);
+  if (config.given)
+    plan.candidates.insert(plan.candidates.end(), config.given->begin(), config.given->end());
   const Visibility visibility(walls, limits);
   const auto views = views_of(plan.candidates, visibility, threads);
 
@@ -198,8 +230,7 @@ CoverPlan plan_cover(const nav::FreeArea& area, const std::vector<Wall>& walls,
   const CoverRules rules{.goal_nm = share_of(config.coverage_goal, coverable.total_nm()),
                          .gain_min_nm = share_of(config.gain_min, targets.total_nm()),
                          .overlap_min = config.overlap_min};
-  const StationChoice choice =
-      choose_stations(views, walls.size(), rules, config.method == CoverMethod::refined, seed);
+  const StationChoice choice = chosen(views, walls.size(), rules, config, seed);
   const GreedyCover& cover = choice.cover;
   const SpanSet covered = add_stations(cover, views, walls.size(), plan);
   plan.overlap = overlap_of(cover, views, config.overlap_min);

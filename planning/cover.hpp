@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -52,6 +53,9 @@ struct CoverConfig {
   double coverage_goal = 0.98;  // Share of the coverable target length.
   double gain_min = 0.02;       // Stop when the next view adds less than this share of the target.
   double overlap_min = 0.2;     // Share of what a station sees that must be seen already.
+  // These stations, in this order, and no others. They count as candidates too, after those drawn,
+  // so that what is coverable stays what some place to stand can see.
+  std::optional<std::vector<Candidate>> given = std::nullopt;
 };
 
 struct CoverPlan {
@@ -62,9 +66,11 @@ struct CoverPlan {
   double target_m{};                      // All target wall of this area.
   double coverable_m{};                   // What the candidates together can see.
   double covered_m{};
-  std::string end;          // Why it stopped, in a sentence.
-  int stations_greedy{};    // How many the paper's greedy cover takes.
-  double goal_m{};          // coverage_goal, or what the greedy cover covers if that is less.
+  std::string end;        // Why it stopped, in a sentence.
+  int stations_greedy{};  // How many the paper's greedy cover takes.
+  // coverage_goal (with given stations, what they cover), or what the greedy cover covers if that
+  // is less.
+  double goal_m{};
   int stations_at_least{};  // Proven: no fewer of these candidates cover goal_m (cover_bound.hpp).
   std::string bound;        // "30 stations; provably at least 26."
   OverlapGraph overlap;     // Of the stations.

@@ -23,8 +23,9 @@ struct Pick {
 };
 
 // goal: enough is covered. gain: of the candidates with enough overlap, none adds enough, nor would
-// any other. overlap: none adds enough, but others would. `all`: no candidate adds anything.
-enum class CoverEnd { goal, gain, overlap, all };
+// any other. overlap: none adds enough, but others would. `all`: no candidate adds anything. given:
+// the picks were not searched for.
+enum class CoverEnd { goal, gain, overlap, all, given };
 
 struct GreedyCover {
   std::vector<Pick> picks;

@@ -190,6 +190,8 @@ const Words& words(Excluded reason) {
       {"gain", "A station for it would add less than the smallest gain worth a scan.",
        "Lower gain_min to have such pieces covered too."},
       {"goal", "The coverage goal was reached without it.", "Raise coverage_goal."},
+      {"given", "None of the stations given by the plan file sees it; others could.",
+       "Add a station to the plan file, or leave it out to have one planned."},
   };
   return kWords[static_cast<std::size_t>(reason)];
 }

@@ -36,7 +36,18 @@ struct Candidate {
 };
 
 // Why a piece of wall is not seen (the first five, in the order they are asked) or not covered.
-enum class Excluded { occluded, range_max, range_min, grazing, field_of_view, overlap, gain, goal };
+// given: the stations were given and see none of it, others could.
+enum class Excluded {
+  occluded,
+  range_max,
+  range_min,
+  grazing,
+  field_of_view,
+  overlap,
+  gain,
+  goal,
+  given
+};
 std::string_view name(Excluded reason);     // "range_max"
 std::string_view meaning(Excluded reason);  // What it means for the piece, in a sentence.
 std::string_view remedy(Excluded reason);   // What one could do about it, in a sentence.

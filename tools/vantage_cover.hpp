@@ -2,8 +2,10 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
-#include "mission/check_report.hpp"
+#include "mission/plan.hpp"
+#include "tools/cover_cbc.hpp"
 
 namespace tools {
 
@@ -15,10 +17,15 @@ struct CoverJudgement {
   int exact_at_least{};  // CBC's bound.
 };
 
-// Plans every area that is not skipped, and gives CBC the same candidates and the same goal,
-// without the rules for overlap and gain; at most time_s for each area.
-std::vector<CoverJudgement> judge_covers(const mission::MissionCheck& check, double time_s,
-                                         int threads);
+// How CBC would cover what the plan covers, with the same candidates and the same goal, without the
+// rules for overlap and gain; at most time_s.
+CbcCover exact_cover(const mission::AreaPlan& plan, const mission::ScannerConfig& scanner,
+                     double time_s, int threads);
+
+// The same for every area that is not skipped.
+std::vector<CoverJudgement> judge_covers(const mission::MissionConfig& config,
+                                         const nav::SiteMap& map, const mission::SiteTasks& tasks,
+                                         double time_s, int threads);
 
 std::string judgement_text(const std::vector<CoverJudgement>& judgements);
 

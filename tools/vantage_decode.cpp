@@ -1,5 +1,4 @@
-#include "tools/vantage_decode.hpp"
-
+// vantage decode DEVICE FILE: what a device said, from a capture.
 #include <fmt/format.h>
 
 #include <filesystem>
@@ -12,12 +11,11 @@
 #include "mission/files.hpp"
 #include "tools/captures.hpp"
 #include "tools/decoders.hpp"
+#include "tools/vantage_command.hpp"
 #include "tools/vantage_decode_output.hpp"
 
 namespace vantage {
 namespace {
-
-constexpr int kDecoded = 0, kNothing = 1, kBadInput = 2;
 
 struct DecodeOptions {
   std::string device;
@@ -102,21 +100,12 @@ int decode_file(const DecodeOptions& options) {
   totals.skipped = capture.skipped;
   decoders.add_skipped(totals.skipped);
   output->end(totals);
-  if (totals.messages > 0) return kDecoded;
+  if (totals.messages > 0) return kFine;
   fmt::print(
       stderr,
       "vantage: {}: no message of {} (read as {}); see --format, --port, --swap and DEVICE\n",
       options.file.string(), options.device, captures::name(capture.format));
-  return kNothing;
-}
-
-int refused_or(const std::function<int()>& command) {
-  try {
-    return command();
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "vantage: {}\n", error.what());
-    return kBadInput;
-  }
+  return kFailed;
 }
 
 std::string device_help() {
@@ -129,7 +118,7 @@ std::string device_help() {
 
 }  // namespace
 
-void add_decode_command(CLI::App& app, std::function<int()>& run) {
+void add_decode_command(CLI::App& app, Run& run) {
   const auto options = std::make_shared<DecodeOptions>();
   auto* command =
       app.add_subcommand("decode", "Prints every message of a device that is in a capture");
@@ -149,7 +138,8 @@ void add_decode_command(CLI::App& app, std::function<int()>& run) {
   auto* json = command->add_flag("--json", options->json, "One JSON object per line");
   command->add_flag("--csv", options->csv, "One row per value")->excludes(json);
   command->callback([options, &run] {
-    run = [options] { return refused_or([&] { return decode_file(*options); }); };
+    // Errors are on stderr only: stdout holds one message a line.
+    run = [options] { return answer(false, [&] { return decode_file(*options); }); };
   });
 }
 

@@ -1,5 +1,4 @@
-#include "tools/vantage_tour.hpp"
-
+// vantage tour: the order of visit for an instance of TSPLIB.
 #include <fmt/format.h>
 
 #include <boost/json/array.hpp>
@@ -8,16 +7,14 @@
 #include <filesystem>
 #include <memory>
 
-#include "mission/json_text.hpp"
 #include "planning/tour.hpp"
 #include "tools/tsplib.hpp"
+#include "tools/vantage_command.hpp"
 
 namespace vantage {
 namespace {
 
 namespace json = boost::json;
-
-constexpr int kFine = 0, kRefused = 2;
 
 struct TourOptions {
   std::filesystem::path file;
@@ -53,18 +50,6 @@ std::string tour_text(const tools::TspInstance& tsp, const planning::Tour& tour)
                      tour.proven ? "proven the shortest" : "not proven the shortest", order);
 }
 
-void tell(const std::vector<mission::ConfigError>& errors, bool as_json) {
-  json::array all;
-  for (const auto& error : errors) {
-    fmt::print(stderr, "{}\n", error.text());
-    all.push_back(json::object{{"file", error.file},
-                               {"line", error.line},
-                               {"column", error.column},
-                               {"message", error.message}});
-  }
-  if (as_json) fmt::print("{}", mission::json_pretty(json::object{{"errors", all}}));
-}
-
 int tour_command(const TourOptions& options) {
   tools::LoadedTsp loaded = tools::load_tsp(options.file);
   planning::TourProblem& problem = loaded.tsp.problem;
@@ -73,15 +58,12 @@ int tour_command(const TourOptions& options) {
     loaded.errors.push_back({"--start", 0, 0,
                              fmt::format("{} is not a node of {}; give one from 1 to {}",
                                          options.start, options.file.string(), nodes)});
-  if (!loaded.errors.empty()) {
-    tell(loaded.errors, options.json);
-    return kRefused;
-  }
+  if (!loaded.errors.empty()) throw Refusal(loaded.errors);
   problem.start = options.start - 1;
   problem.closed = !options.open;
   const planning::Tour tour = planning::solve_tour(problem, options.config);
   if (options.json)
-    fmt::print("{}", mission::json_pretty(tour_json(loaded.tsp, tour)));
+    print_json(tour_json(loaded.tsp, tour));
   else
     fmt::print("{}", tour_text(loaded.tsp, tour));
   return kFine;
@@ -89,7 +71,7 @@ int tour_command(const TourOptions& options) {
 
 }  // namespace
 
-void add_tour_command(CLI::App& app, std::function<int()>& run) {
+void add_tour_command(CLI::App& app, Run& run) {
   const auto options = std::make_shared<TourOptions>();
   auto* command = app.add_subcommand(
       "tour", "Finds a short tour through the nodes of a TSPLIB file, as the planner does");
@@ -108,8 +90,10 @@ void add_tour_command(CLI::App& app, std::function<int()>& run) {
       ->capture_default_str();
   command->add_option("--seed", options->config.seed, "Of the search's perturbations")
       ->capture_default_str();
-  command->add_flag("--json", options->json, "Report as JSON on stdout, errors too");
-  command->callback([options, &run] { run = [options] { return tour_command(*options); }; });
+  add_json_flag(*command, options->json);
+  command->callback([options, &run] {
+    run = [options] { return answer(options->json, [&] { return tour_command(*options); }); };
+  });
 }
 
 }  // namespace vantage

@@ -1,0 +1,112 @@
+#include "mission/main_run.hpp"
+
+#include <fmt/format.h>
+
+#include <boost/asio/co_spawn.hpp>
+#include <ostream>
+#include <thread>
+
+#include "mission/report.hpp"
+
+namespace mission {
+namespace {
+
+// The ground's height from the model, where the map is silent.
+void take_ground(Prepared& prepared, std::vector<nav::FreeArea>& areas) {
+  nav::SiteMap& map = prepared.site.map;
+  assume_ground(prepared.sim, map);
+  for (nav::FreeArea& area : areas) area.ground_z_m = map.ground_z_m;
+}
+
+void load_world(Prepared& prepared, const MissionCheck& check, WorldUse use,
+                const std::filesystem::path& replacement, std::vector<nav::FreeArea>& areas) {
+  const auto model = replacement.empty() ? check.model_file : std::optional(replacement);
+  const std::string folder = check.config.site_folder.generic_string();
+  if (!model && use == WorldUse::world)
+    prepared.errors.push_back({folder, 0, 0,
+                               "no model.obj, which simulation needs as the world; add one, or run "
+                               "`vantage rehearse --model FILE.obj`"});
+  if (!model || (use == WorldUse::ground && check.ground_mapped)) return;
+  prepared.sim = load_sim_site(*model);
+  for (const std::string& error : prepared.sim.errors)
+    prepared.errors.push_back(site_error(error, model->generic_string()));
+  if (prepared.errors.empty() && !check.ground_mapped) take_ground(prepared, areas);
+}
+
+// The products that are made once at the end; those of each scan are on disk already.
+void save_products(RunStore& store, const Survey& survey) {
+  const SiteModel& model = survey.model();
+  ProductFacts facts;
+  facts.map_ot_offset_m =
+      store.save_map(model.map().grid(), [&](planning::Voxel v) { return model.map().at(v); })
+          .value()
+          .offset_m;
+  store.save_cloud(survey.cloud()).value();
+  facts.cloud_points = survey.cloud().points().size();
+  facts.cloud_grid_m = survey.cloud().grid_m();
+  facts.cloud_doublings = survey.cloud().doublings();
+  store.save_summary(summarise(survey.record(), facts)).value();
+  store.save_report(report_html(survey.record(), facts)).value();
+  store.finish().value();
+}
+
+// Runs the survey to its end; returns what went wrong, or "".
+std::string run_survey(SimBackend& backend, Survey& survey) {
+  bool ended = false;
+  std::string failure;
+  boost::asio::co_spawn(backend.io(), survey.run(), [&](std::exception_ptr error) {
+    ended = true;
+    try {
+      if (error) std::rethrow_exception(error);
+    } catch (const std::exception& e) {
+      failure = e.what();
+    }
+  });
+  if (!backend.run([&] { return ended; }))
+    return "the mission waits for something that cannot come";
+  return failure;
+}
+
+}  // namespace
+
+Prepared prepare(const std::filesystem::path& mission_file, const Overrides& overrides,
+                 WorldUse use, const std::filesystem::path& model_file) {
+  MissionCheck check = check_mission(mission_file, overrides);
+  Prepared prepared;
+  prepared.config = check.config;
+  prepared.site = std::move(check.site);
+  prepared.notes = check.notes;
+  prepared.errors = check.errors;
+  if (!prepared.errors.empty()) return prepared;
+  if (use != WorldUse::none) load_world(prepared, check, use, model_file, check.areas);
+  if (!prepared.errors.empty()) return prepared;
+  prepared.tasks = assign_areas(prepared.config, prepared.site.map, check.areas);
+  if (use == WorldUse::world)
+    complete_ground(prepared.sim, prepared.site.map, prepared.tasks.tasks);
+  prepared.notes.insert(prepared.notes.end(), prepared.sim.notes.begin(), prepared.sim.notes.end());
+  return prepared;
+}
+
+RunOutcome run_in_simulation(Prepared& prepared, const RunOptions& options) {
+  SimBackend backend(prepared.config, prepared.tasks, std::move(prepared.sim), options.threads);
+  RunStore store = RunStore::open(options.out).value();
+  std::ostream none(nullptr);
+  ProgressPrinter progress(options.progress ? *options.progress : none,
+                           options.progress && options.terminal);
+  Survey survey(prepared.config, prepared.site.map, prepared.tasks, options.threads,
+                {backend.clock(), backend.devices(), store, progress});
+  RunRecord& record = survey.record();
+  record.repairs = prepared.site.repairs;
+  record.notes.insert(record.notes.begin(), prepared.notes.begin(), prepared.notes.end());
+  std::string failure = run_survey(backend, survey);
+  progress.finish();
+  record.truth = backend.judge(record, survey.model(), prepared.tasks.tasks, options.judge_cells);
+  save_products(store, survey);
+  return {std::move(record), store.report_path(), std::move(failure)};
+}
+
+int threads_or_all(int threads) {
+  return threads > 0 ? threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+}  // namespace mission

@@ -1,0 +1,61 @@
+// A mission made ready, and a mission run in simulation: what vantaged and `vantage` share. Like
+// main.cpp it may know everything.
+#pragma once
+
+#include <filesystem>
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+#include "mission/check_report.hpp"
+#include "mission/main_sim.hpp"
+#include "mission/summary.hpp"
+#include "mission/survey.hpp"
+
+namespace mission {
+
+// How much of the site's 3-D model is wanted.
+enum class WorldUse {
+  none,    // The map alone.
+  ground,  // Where the map does not tell the ground's height, the model does, if there is one.
+  world    // The model is the world to simulate: without one there is an error.
+};
+
+// Everything that must be right before anything starts or is written.
+struct Prepared {
+  MissionConfig config;
+  nav::RepairedSite site;
+  SiteTasks tasks;
+  SimSite sim;                     // With WorldUse::world.
+  std::vector<std::string> notes;  // Of site and model; the tasks have their own.
+  std::vector<ConfigError> errors;
+};
+
+// Reads and checks mission, robot, plan and site; `model_file` replaces the site's model when not
+// empty. Never throws for what files hold.
+Prepared prepare(const std::filesystem::path& mission_file, const Overrides& overrides,
+                 WorldUse use, const std::filesystem::path& model_file = {});
+
+struct RunOptions {
+  std::filesystem::path out;          // Folder for the run's products.
+  std::filesystem::path judge_cells;  // See SimBackend::judge.
+  int threads = 1;
+  std::ostream* progress = nullptr;  // Null: says nothing.
+  bool terminal = false;             // Whether `progress` is one.
+};
+
+struct RunOutcome {
+  RunRecord record;
+  std::filesystem::path report;
+  std::string failure;  // Not empty: what ended it early.
+};
+
+// Runs the whole mission in simulation and writes its products. Uses up prepared.sim. Throws
+// boost::system::system_error when the folder cannot be written, std::runtime_error when the robot
+// cannot stand at its start.
+RunOutcome run_in_simulation(Prepared& prepared, const RunOptions& options);
+
+// Threads to use for 0: one a core.
+int threads_or_all(int threads);
+
+}  // namespace mission
