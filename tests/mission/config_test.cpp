@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -65,10 +66,12 @@ TEST(Config, EmptyTextGivesTheDefaults) {
 
 TEST(Config, DefaultsOfEveryKeyLieInTheirOwnRange) {
   mission::MissionConfig config;
-  for (const auto& section : mission::config_schema())
+  for (const auto& section : mission::config_schema()) {
+    if (section.add_entry) section.add_entry(config, {});
     for (const auto& spec : section.keys) {
       const auto slot = spec.slot(config);
-      if (const auto* const* number = std::get_if<double*>(&slot)) {
+      if (const auto* const* number = std::get_if<double*>(&slot);
+          number != nullptr && !std::isnan(**number)) {  // NaN: there is no default.
         EXPECT_GE(**number, spec.min) << spec.key;
         EXPECT_LE(**number, spec.max) << spec.key;
       }
@@ -78,6 +81,7 @@ TEST(Config, DefaultsOfEveryKeyLieInTheirOwnRange) {
       }
       EXPECT_FALSE(spec.help.empty()) << spec.key;
     }
+  }
 }
 
 TEST(Config, EveryKeyIsReadIntoItsMember) {
@@ -85,6 +89,7 @@ TEST(Config, EveryKeyIsReadIntoItsMember) {
 robot = "robots/r.toml"
 site = "../sites/s"
 seed = 9223372036854775807
+plan = "p.toml"
 margin_m = 12
 return_home = false
 [regions]
@@ -128,6 +133,11 @@ elevation_min_deg = -10
 elevation_max_deg = 20
 elevation_step_deg = 0.25
 scan_s = 60
+[battery]
+capacity_wh = 900
+drive_w = 150
+scan_w = 40
+idle_w = 20
 [sim]
 range_sigma_m = 0.1
 slip_sigma = 0.2
@@ -146,6 +156,7 @@ placement_s = 8
 robot=robots/r.toml
 site=../sites/s
 seed=9223372036854775807
+plan=p.toml
 margin_m=12
 return_home=false
 phase1.cover=greedy
@@ -180,6 +191,10 @@ robot.scanner.elevation_min_deg=-10
 robot.scanner.elevation_max_deg=20
 robot.scanner.elevation_step_deg=0.25
 robot.scanner.scan_s=60
+robot.battery.capacity_wh=900
+robot.battery.drive_w=150
+robot.battery.scan_w=40
+robot.battery.idle_w=20
 robot.sim.range_sigma_m=0.1
 robot.sim.slip_sigma=0.2
 robot.sim.gyro_sigma_degps=0.3

@@ -393,6 +393,38 @@ TEST(PlanCover, RefinedTakesNoMoreStationsThanGreedyAndSaysHowFewCouldDo) {
   EXPECT_GE(fewer, 2);
 }
 
+// With so few candidates every subset of them is asked.
+TEST(PlanCover, SaysOfGivenStationsHowFewCoverAsMuch) {
+  int spared = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    const Site s = random_site(seed);
+    CoverConfig config{.candidates = 8, .gain_min = 0, .overlap_min = 0};
+    config.given = draw_candidates(s.area, static_cast<int>(seed), kScanner.fov_deg, 100 + seed);
+    const CoverPlan plan = plan_cover(s.area, s.walls, kScanner, config, seed, 2);
+    ASSERT_EQ(plan.stations.size(), config.given->size());
+    for (std::size_t i = 0; i < plan.stations.size(); ++i)
+      EXPECT_EQ(plan.stations[i].at, (*config.given)[i]);
+    EXPECT_NEAR(plan.goal_m, plan.covered_m, 1e-8);
+    EXPECT_GT(plan.stations_at_least, 0);
+    const int optimum = cover_problems::optimum(cover_problem(plan, s.walls, kScanner, 1));
+    EXPECT_LE(plan.stations_at_least, optimum);
+    EXPECT_LE(optimum, static_cast<int>(plan.stations.size()));
+    spared += optimum < static_cast<int>(plan.stations.size());
+    EXPECT_EQ(plan.overlap.part_of_station.size(), plan.stations.size());
+  }
+  EXPECT_GE(spared, 1);  // Else the given stations would show nothing.
+}
+
+TEST(PlanCover, NoStationGivenIsNoStation) {
+  const Site s = random_site(1);
+  const CoverPlan plan =
+      plan_cover(s.area, s.walls, kScanner, {.candidates = 8, .given = {{}}}, 1, 1);
+  EXPECT_TRUE(plan.stations.empty());
+  EXPECT_EQ(plan.covered_m, 0);
+  EXPECT_EQ(plan.stations_at_least, 0);
+  EXPECT_EQ(plan.bound, "");
+}
+
 // What stopped the candidate that came furthest, asked point by point.
 std::optional<Excluded> furthest(const std::vector<Candidate>& candidates, const WallPiece& piece,
                                  const std::vector<Wall>& walls, const SensorLimits& limits) {

@@ -1,64 +1,20 @@
-// `vantage` as a person or a script uses it: what it prints where, and its exit codes.
+// `vantage check` and `vantage keys`: what they print where, and their exit codes.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <sys/wait.h>
 
 #include <algorithm>
-#include <array>
-#include <boost/json/parse.hpp>
-#include <boost/json/value.hpp>
-#include <cstdio>
-#include <filesystem>
-#include <fstream>
-#include <sstream>
-#include <string>
 
 #include "mission/config_schema.hpp"
-#include "tests/support/temp_folder.hpp"
+#include "tests/tools/vantage_test.hpp"
 
 namespace {
 
 namespace fs = std::filesystem;
+using test::read_text;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-struct Outcome {
-  int code = -1;
-  std::string out;
-  std::string err;
-};
-
-std::string read_text(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return std::move(text).str();
-}
-
-class Vantage : public testing::Test {
+class Vantage : public test::VantageTest {
  protected:
-  Outcome run(const std::string& arguments) const {
-    const auto err = folder_.path() / "stderr";
-    const std::string command =
-        std::string(VANTAGE_BINARY_DIR) + "/vantage " + arguments + " 2>" + err.string();
-    FILE* pipe = popen(command.c_str(), "r");
-    Outcome outcome;
-    if (pipe == nullptr) return outcome;
-    std::array<char, 4096> buffer{};
-    while (const auto read = fread(buffer.data(), 1, buffer.size(), pipe))
-      outcome.out.append(buffer.data(), read);
-    const int status = pclose(pipe);
-    outcome.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-    outcome.err = read_text(err);
-    return outcome;
-  }
-
-  fs::path write(const std::string& name, const std::string& text) const {
-    const auto file = folder_.path() / name;
-    fs::create_directories(file.parent_path());
-    std::ofstream(file, std::ios::binary) << text;
-    return file;
-  }
-
   // A yard of 40 x 40 m with a hut in it and a pond around a corner; the hut's first corner twice.
   void write_site(const std::string& folder) const {
     write(folder + "/footprint.geojson", R"({"type": "FeatureCollection", "features": [
@@ -70,8 +26,6 @@ class Vantage : public testing::Test {
   "coordinates": [[[0, 0], [40, 0], [40, 40], [0, 40], [0, 0]]]}}]}
 )");
   }
-
-  test::TempFolder folder_;
 };
 
 TEST_F(Vantage, CheckSaysWhatAGoodMissionWillUseOnOneScreen) {
