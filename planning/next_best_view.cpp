@@ -78,15 +78,19 @@ std::vector<std::uint32_t> sweep(const VoxelMap& map, std::vector<BoundaryVoxel>
                                  int threads) {
   const std::size_t tallies = layers.empty() ? 0 : layers.back().tally_end();
   std::stable_sort(boundary.begin(), boundary.end(),
-                   [](const BoundaryVoxel& a, const BoundaryVoxel& b) { return a.v.z < b.v.z; });
+                   [](const BoundaryVoxel& a, const BoundaryVoxel& b) { return by_layer(a.v, b.v); });
   const std::vector<Task> tasks = make_tasks(boundary, layers);
   const BlockedRows blocked(map);
   std::vector<Sweep<SeenCounts>> sweeps(
       static_cast<std::size_t>(std::max(threads, 1)),
       {map.grid(), blocked, rule, SeenCounts{std::vector<std::uint32_t>(tallies)}});
   for_pieces(threads, tasks.size(), 1, [&](int thread, std::size_t task, std::size_t) {
-    for (std::size_t i = tasks[task].begin; i < tasks[task].end; ++i)
-      sweeps[static_cast<std::size_t>(thread)].add(boundary[i], *tasks[task].layer);
+    const BoundaryVoxel* const end = boundary.data() + tasks[task].end;
+    for (const BoundaryVoxel *row = boundary.data() + tasks[task].begin, *next; row != end;
+         row = next) {
+      next = std::find_if(row, end, [&](const BoundaryVoxel& u) { return u.v.y != row->v.y; });
+      sweeps[static_cast<std::size_t>(thread)].add(row, next, *tasks[task].layer);
+    }
   });
   std::vector<std::uint32_t> sum(tallies);
   for (const Sweep<SeenCounts>& part : sweeps)

@@ -100,6 +100,7 @@ LayerPaths::LayerPaths(const ViewRule& rule, int c, int b_max) : c_(c) {
 
 void LayerPaths::add_path(int b) {
   const std::size_t first = cells_.size();
+  steps_begin_.push_back(after_steps_.size());
   PathTimes times;
   int j = 0, k = 0;
   for (bool more = true; more;) {
@@ -117,6 +118,9 @@ void LayerPaths::add_path(int b) {
     cell.k = static_cast<std::int16_t>(k);
     cells_.push_back(cell);
     times_.push_back(times);
+    // A diagonal step passes no cell between: the one before stands in for it.
+    for (int step = 0; step < std::max(step_y + step_z, 1); ++step)
+      after_steps_.push_back(static_cast<std::uint16_t>(cells_.size() - 1 - first));
     times.in_num = times.out_num;
     times.in_den = times.out_den;
     j += step_y;

@@ -97,11 +97,20 @@ class LayerPaths {
   struct Path {
     const PathCell* cells;
     const PathTimes* times;
-    int count;
+    const std::uint16_t* after_steps;  // The cell after so many steps along y and z; b + c + 1.
+    int count, steps;
+
+    // When it is in cell (j, k), all >= 0; nullptr if it passes it by.
+    const PathTimes* times_in(int j, int k) const {
+      if (j + k > steps) return nullptr;
+      const int i = after_steps[j + k];
+      return cells[i].j == j && cells[i].k == k ? &times[i] : nullptr;
+    }
   };
   Path path(int b) const {
     const auto i = static_cast<std::size_t>(b);
-    return {&cells_[begin_[i]], &times_[begin_[i]], static_cast<int>(begin_[i + 1] - begin_[i])};
+    return {&cells_[begin_[i]], &times_[begin_[i]], &after_steps_[steps_begin_[i]],
+            static_cast<int>(begin_[i + 1] - begin_[i]), b + c_};
   }
 
  private:
@@ -109,7 +118,8 @@ class LayerPaths {
 
   int c_;
   std::vector<RowLimits> limits_;
-  std::vector<std::size_t> begin_;
+  std::vector<std::size_t> begin_, steps_begin_;
+  std::vector<std::uint16_t> after_steps_;
   std::vector<PathCell> cells_;
   std::vector<PathTimes> times_;
 };

@@ -93,51 +93,56 @@ const LayerPaths& Sweep<Sink>::paths(int c) {
 }
 
 template <class Sink>
-void Sweep<Sink>::add(const BoundaryVoxel& u, const CandidateLayer& layer, Interval rows) {
-  const int c = layer.z() - u.v.z;
-  const bool z_face = c != 0 && (u.faces & (c > 0 ? kFaceZPlus : kFaceZMinus)) != 0;
-  if (!z_face && (u.faces & ~(kFaceZPlus | kFaceZMinus)) == 0) return;
+void Sweep<Sink>::add(const BoundaryVoxel* begin, const BoundaryVoxel* end,
+                      const CandidateLayer& layer, Interval rows) {
+  if (begin == end) return;
+  const Voxel at = begin->v;
+  const int c = layer.z() - at.z;
   const LayerPaths& paths = this->paths(std::abs(c));
-
-  int y_sign = 0;  // Of the row before.
   Rays rays{};
   rays.c = std::abs(c);
-  rays.u = u.v;
-  rays.row_u = std::int64_t{u.v.z} * grid_.ny + u.v.y;
+  rays.row_u = std::int64_t{at.z} * grid_.ny + at.y;
   rays.z_sign = c < 0 ? -1 : 1;
   rays.step_z = rays.z_sign * grid_.ny;
-  rows.first = std::max(rows.first, u.v.y - paths.rows() + 1);
-  rows.last = std::min(rows.last, u.v.y + paths.rows() - 1);
+  rays.u = at;
+  rows.first = std::max(rows.first, at.y - paths.rows() + 1);
+  rows.last = std::min(rows.last, at.y + paths.rows() - 1);
   const auto first = std::lower_bound(layer.rows().begin(), layer.rows().end(), rows.first,
                                       [](const CandidateLayer::Row& r, int y) { return r.y < y; });
   for (auto row = first; row != layer.rows().end() && row->y <= rows.last; ++row) {
-    const int b = row->y - u.v.y;
-    const RowLimits& limits = paths.limits(std::abs(b));
-    int faced_last = z_face ? limits.z_face_last : -1;
-    if (b != 0 && (u.faces & (b > 0 ? kFaceYPlus : kFaceYMinus)) != 0)
-      faced_last = std::max(faced_last, limits.y_face_last);
-    const auto admit = [&](Face x_face) {
-      const bool faced = (u.faces & x_face) != 0;
-      const int from = std::max(limits.in_range_first, limits.x_face_first);
-      return Admitted{{limits.in_range_first, from},
-                      {std::min(faced_last, limits.in_range_last),
-                       faced ? std::min(limits.x_face_last, limits.in_range_last) : -1}};
-    };
-    rays.y_sign = b < 0 ? -1 : 1;
-    rays.step_y = rays.y_sign;
-    if (rays.y_sign != y_sign) last_[0].count = last_[1].count = 0;
-    y_sign = rays.y_sign;
+    const int b = row->y - at.y, y_sign = b < 0 ? -1 : 1;
+    if (row == first || y_sign != rays.y_sign)
+      last_.assign(2 * static_cast<std::size_t>(end - begin), {});
+    rays.y_sign = y_sign;
+    rays.step_y = y_sign;
     rays.b = std::abs(b);
-    rays.path = paths.path(std::abs(b));
-    add_side<1>(rays, layer, *row, admit(kFaceXPlus));
-    add_side<-1>(rays, layer, *row, admit(kFaceXMinus));
+    rays.path = paths.path(rays.b);
+    const RowLimits& limits = paths.limits(rays.b);
+    const int y_face = b == 0 ? 0 : b > 0 ? kFaceYPlus : kFaceYMinus;
+    const int z_face = c == 0 ? 0 : c > 0 ? kFaceZPlus : kFaceZMinus;
+    LastRuns* last = last_.data();
+    for (const BoundaryVoxel* u = begin; u != end; ++u, last += 2) {
+      rays.u.x = u->v.x;
+      const int faced_last = std::max((u->faces & y_face) != 0 ? limits.y_face_last : -1,
+                                      (u->faces & z_face) != 0 ? limits.z_face_last : -1);
+      const auto admit = [&](Face x_face) {
+        const int from = std::max(limits.in_range_first, limits.x_face_first);
+        return Admitted{{limits.in_range_first, from},
+                        {std::min(faced_last, limits.in_range_last),
+                         (u->faces & x_face) != 0
+                             ? std::min(limits.x_face_last, limits.in_range_last)
+                             : -1}};
+      };
+      add_side<1>(rays, layer, *row, admit(kFaceXPlus), last[0]);
+      add_side<-1>(rays, layer, *row, admit(kFaceXMinus), last[1]);
+    }
   }
 }
 
 template <class Sink>
 template <int kSide>
 void Sweep<Sink>::add_side(const Rays& rays, const CandidateLayer& layer,
-                           const CandidateLayer::Row& row, const Admitted& admitted) {
+                           const CandidateLayer::Row& row, const Admitted& admitted, LastRuns& last_runs) {
   // In |a|, from the first to the last admitted candidate of the row; a = 0 is on the plus side.
   int first = INT32_MAX, last = -1;
   for (int i = 0; i < 2; ++i)
@@ -149,6 +154,10 @@ void Sweep<Sink>::add_side(const Rays& rays, const CandidateLayer& layer,
   const int farthest = kSide > 0 ? row.x_last - rays.u.x : rays.u.x - row.x_first;
   first = std::max({first, nearest, kSide > 0 ? 0 : 1});
   last = std::min(last, farthest);
+  if (first > last) return;
+  const Known known = known_shadows<kSide>(rays, {first, last}, last_runs);
+  first = known.open.first;
+  last = known.open.last;
 
   const auto candidates = [&](int a) {
     std::uint64_t bits;
@@ -157,10 +166,12 @@ void Sweep<Sink>::add_side(const Rays& rays, const CandidateLayer& layer,
     } else {
       bits = reverse_bits(layer.bits(row, rays.u.x - a - 63));
     }
-    return bits &
-           (bits_within(a, admitted.first[0], admitted.last[0]) |
-            bits_within(a, admitted.first[1], admitted.last[1])) &
-           bits_within(a, first, last);
+    bits &= (bits_within(a, admitted.first[0], admitted.last[0]) |
+             bits_within(a, admitted.first[1], admitted.last[1])) &
+            bits_within(a, first, last);
+    for (int i = 0; i < known.count; ++i)
+      bits &= ~bits_within(a, known.inner[i].first, known.inner[i].last);
+    return bits;
   };
   while (first <= last) {
     std::uint64_t bits = candidates(first);
@@ -168,7 +179,7 @@ void Sweep<Sink>::add_side(const Rays& rays, const CandidateLayer& layer,
       const int skip = std::countr_zero(bits);
       if (skip != 0) bits = candidates(first += skip);
       Live live{bits, first, 0, 0};
-      cast<kSide>(rays, live);
+      cast<kSide>(rays, last_runs, live);
       if (live.bits != 0) {
         if constexpr (kSide > 0) {
           sink_.seen(layer, row, rays.u.x + first, live.bits);
@@ -184,11 +195,9 @@ void Sweep<Sink>::add_side(const Rays& rays, const CandidateLayer& layer,
 // Clears the candidates that something hides, from u outwards.
 template <class Sink>
 template <int kSide>
-void Sweep<Sink>::cast(const Rays& rays, Live& live) {
-  shade_again<kSide>(rays, live);
-  if (live.bits == 0) return;
+void Sweep<Sink>::cast(const Rays& rays, LastRuns& last_runs, Live& live) {
   live.measure();
-  shade<kSide>(rays, 0, live);
+  shade<kSide>(rays, 0, last_runs, live);
   int l = 1;
   for (int i = 1; i < rays.path.count && live.bits != 0;) {
     const PathCell& cell = rays.path.cells[i];
@@ -208,7 +217,7 @@ void Sweep<Sink>::cast(const Rays& rays, Live& live) {
     } else if (l > 0) {
       l /= 4;
     } else {
-      shade<kSide>(rays, i, live);
+      shade<kSide>(rays, i, last_runs, live);
       ++i;
     }
   }
@@ -236,7 +245,7 @@ bool Sweep<Sink>::clear_window(const Rays& rays, int block, std::int64_t row, in
 // Clears what the blocked voxels of one cell shadow. u itself does not block.
 template <class Sink>
 template <int kSide>
-void Sweep<Sink>::shade(const Rays& rays, int cell, Live& live) {
+void Sweep<Sink>::shade(const Rays& rays, int cell, LastRuns& last_runs, Live& live) {
   const PathCell& c = rays.path.cells[cell];
   const PathTimes& times = rays.path.times[cell];
   const std::int64_t row = rays.row_u + c.j * rays.step_y + c.k * rays.step_z;
@@ -254,7 +263,7 @@ void Sweep<Sink>::shade(const Rays& rays, int cell, Live& live) {
       const int r0 = kSide > 0 ? first + begin : first + width - begin - length;
       Run run{c.j, c.k, r0, r0 + length - 1};
       if (begin == 0 || begin + length == width) extend<kSide>(rays, row, run);
-      hide<kSide>(rays, run, times, live);
+      hide<kSide>(rays, run, times, last_runs, live);
     }
   }
   if (live.bits != 0) live.measure();
@@ -280,25 +289,49 @@ void Sweep<Sink>::extend(const Rays& rays, std::int64_t row, Run& run) const {
 // Clears what one run shadows, and keeps it in mind if that was anything.
 template <class Sink>
 template <int kSide>
-void Sweep<Sink>::hide(const Rays& rays, const Run& run, const PathTimes& times, Live& live) {
+void Sweep<Sink>::hide(const Rays& rays, const Run& run, const PathTimes& times,
+                       LastRuns& last_runs, Live& live) {
   const std::uint64_t shadow =
       bits_within(live.first, times.shadow_first(run.r0), times.shadow_last(run.r1));
   if ((live.bits & shadow) == 0) return;
   live.bits &= ~shadow;
-  LastRuns& last = last_[kSide > 0];
-  if (last.count < LastRuns::kMost) last.runs[last.count++] = run;
-  sink_.hidden(rays.row_u + run.j * rays.step_y + run.k * rays.step_z,
-               kSide > 0 ? rays.u.x + run.r0 : rays.u.x - run.r1, run.r1 - run.r0 + 1);
+  if (last_runs.count < LastRuns::kMost) last_runs.runs[last_runs.count++] = run;
+  name<kSide>(rays, run);
+}
+
+// What the runs that hid candidates of the row before hide of this one, forgetting the others.
+template <class Sink>
+template <int kSide>
+typename Sweep<Sink>::Known Sweep<Sink>::known_shadows(const Rays& rays, Interval span,
+                                                       LastRuns& last_runs) {
+  Known known{.open = span, .inner = {}, .count = 0};
+  Interval& open = known.open;
+  const int before = last_runs.count;
+  last_runs.count = 0;
+  for (int i = 0; i < before && !open.empty(); ++i) {
+    const Run run = last_runs.runs[i];
+    const PathTimes* const times = rays.path.times_in(run.j, run.k);
+    if (times == nullptr) continue;
+    const int first = times->shadow_first(run.r0), last = times->shadow_last(run.r1);
+    if (first > open.last || last < open.first) continue;
+    last_runs.runs[last_runs.count++] = run;
+    name<kSide>(rays, run);
+    if (first <= open.first) {
+      open.first = std::min(last, open.last) + 1;
+    } else if (last >= open.last) {
+      open.last = first - 1;
+    } else {
+      known.inner[known.count++] = {first, last};
+    }
+  }
+  return known;
 }
 
 template <class Sink>
 template <int kSide>
-void Sweep<Sink>::shade_again(const Rays& rays, Live& live) {
-  const LastRuns before = last_[kSide > 0];
-  last_[kSide > 0].count = 0;
-  for (int i = 0; i < before.count && live.bits != 0; ++i)
-    if (const auto times = times_in_cell(rays.b, rays.c, before.runs[i].j, before.runs[i].k))
-      hide<kSide>(rays, before.runs[i], *times, live);
+void Sweep<Sink>::name(const Rays& rays, const Run& run) {
+  sink_.hidden(rays.row_u + run.j * rays.step_y + run.k * rays.step_z,
+               kSide > 0 ? rays.u.x + run.r0 : rays.u.x - run.r1, run.r1 - run.r0 + 1);
 }
 
 void SeenCounts::seen(const CandidateLayer&, const CandidateLayer::Row& row, int x,

@@ -85,7 +85,13 @@ class Sweep {
   Sweep(const VoxelGrid& grid, const BlockedRows& blocked, const ViewRule& rule, Sink sink)
       : grid_(grid), blocked_(blocked), rule_(rule), sink_(std::move(sink)) {}
 
-  void add(const BoundaryVoxel& u, const CandidateLayer& layer, Interval rows = {});
+  void add(const BoundaryVoxel& u, const CandidateLayer& layer, Interval rows = {}) {
+    add(&u, &u + 1, layer, rows);
+  }
+  // Several of one y and z at once, so that they share a row's paths while these are at hand. What
+  // the sink gets does not tell them apart.
+  void add(const BoundaryVoxel* begin, const BoundaryVoxel* end, const CandidateLayer& layer,
+           Interval rows = {});
   Sink& sink() { return sink_; }
   const Sink& sink() const { return sink_; }
 
@@ -114,6 +120,12 @@ class Sweep {
     Run runs[kMost];
     int count{};
   };
+  // What the last runs leave: |a| within `open`, less what is in `inner`.
+  struct Known {
+    Interval open;
+    Interval inner[LastRuns::kMost];
+    int count{};
+  };
   // Candidates still visible: bit i for |a| = first + i.
   struct Live {
     std::uint64_t bits;
@@ -125,17 +137,20 @@ class Sweep {
   const LayerPaths& paths(int c);
   template <int kSide>
   void add_side(const Rays& rays, const CandidateLayer& layer, const CandidateLayer::Row& row,
-                const Admitted& admitted);
+                const Admitted& admitted, LastRuns& last_runs);
   template <int kSide>
-  void cast(const Rays& rays, Live& live);
+  void cast(const Rays& rays, LastRuns& last_runs, Live& live);
   template <int kSide>
-  void shade_again(const Rays& rays, Live& live);
+  Known known_shadows(const Rays& rays, Interval span, LastRuns& last_runs);
   template <int kSide>
-  void shade(const Rays& rays, int cell, Live& live);
+  void shade(const Rays& rays, int cell, LastRuns& last_runs, Live& live);
   template <int kSide>
   void extend(const Rays& rays, std::int64_t row, Run& run) const;
   template <int kSide>
-  void hide(const Rays& rays, const Run& run, const PathTimes& times, Live& live);
+  void hide(const Rays& rays, const Run& run, const PathTimes& times, LastRuns& last_runs,
+            Live& live);
+  template <int kSide>
+  void name(const Rays& rays, const Run& run);
   template <int kSide>
   std::uint64_t window(const Rays& rays, int block, std::int64_t row, int first, int width) const;
   template <int kSide>
@@ -146,7 +161,7 @@ class Sweep {
   ViewRule rule_;
   static constexpr std::size_t kPathsKept = 4;
   std::vector<LayerPaths> paths_;  // Of the last few |c| asked for, the latest at the end.
-  LastRuns last_[2];               // Of each side.
+  std::vector<LastRuns> last_;     // Two for each u, of its plus and its minus side.
   Sink sink_;
 };
 
