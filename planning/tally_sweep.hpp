@@ -116,7 +116,7 @@ class Sweep {
   // The runs that hid candidates of the row before: likely they do so again in the next one, and
   // then the way there need not be gone.
   struct LastRuns {
-    static constexpr int kMost = 4;
+    static constexpr int kMost = 8;
     Run runs[kMost];
     int count{};
   };
