@@ -77,8 +77,9 @@ std::vector<std::uint32_t> sweep(const VoxelMap& map, std::vector<BoundaryVoxel>
                                  const std::vector<CandidateLayer>& layers, const ViewRule& rule,
                                  int threads) {
   const std::size_t tallies = layers.empty() ? 0 : layers.back().tally_end();
-  std::stable_sort(boundary.begin(), boundary.end(),
-                   [](const BoundaryVoxel& a, const BoundaryVoxel& b) { return by_layer(a.v, b.v); });
+  std::stable_sort(
+      boundary.begin(), boundary.end(),
+      [](const BoundaryVoxel& a, const BoundaryVoxel& b) { return by_layer(a.v, b.v); });
   const std::vector<Task> tasks = make_tasks(boundary, layers);
   const BlockedRows blocked(map);
   std::vector<Sweep<SeenCounts>> sweeps(

@@ -127,11 +127,10 @@ void Sweep<Sink>::add(const BoundaryVoxel* begin, const BoundaryVoxel* end,
                                       (u->faces & z_face) != 0 ? limits.z_face_last : -1);
       const auto admit = [&](Face x_face) {
         const int from = std::max(limits.in_range_first, limits.x_face_first);
-        return Admitted{{limits.in_range_first, from},
-                        {std::min(faced_last, limits.in_range_last),
-                         (u->faces & x_face) != 0
-                             ? std::min(limits.x_face_last, limits.in_range_last)
-                             : -1}};
+        return Admitted{
+            {limits.in_range_first, from},
+            {std::min(faced_last, limits.in_range_last),
+             (u->faces & x_face) != 0 ? std::min(limits.x_face_last, limits.in_range_last) : -1}};
       };
       add_side<1>(rays, layer, *row, admit(kFaceXPlus), last[0]);
       add_side<-1>(rays, layer, *row, admit(kFaceXMinus), last[1]);
@@ -142,7 +141,8 @@ void Sweep<Sink>::add(const BoundaryVoxel* begin, const BoundaryVoxel* end,
 template <class Sink>
 template <int kSide>
 void Sweep<Sink>::add_side(const Rays& rays, const CandidateLayer& layer,
-                           const CandidateLayer::Row& row, const Admitted& admitted, LastRuns& last_runs) {
+                           const CandidateLayer::Row& row, const Admitted& admitted,
+                           LastRuns& last_runs) {
   // In |a|, from the first to the last admitted candidate of the row; a = 0 is on the plus side.
   int first = INT32_MAX, last = -1;
   for (int i = 0; i < 2; ++i)
