@@ -219,6 +219,7 @@ void RunningTally::refresh(const Changes& changes) {
     workers.push_back({.sweep = {grid, blocked, *rule_, SeenSet(map_->row_words(), rows)},
                        .gains = std::vector<std::uint32_t>(counts_.size()),
                        .before = {},
+                       .saved = false,
                        .rows = {}});
   constexpr std::size_t kPiece = 128;
   for_pieces(threads_, sights_.size(), kPiece, [&](int thread, std::size_t begin, std::size_t end) {
@@ -234,12 +235,13 @@ void RunningTally::refresh(const Changes& changes) {
 }
 
 void RunningTally::refresh(Sight& sight, const Changes& changes, Worker& worker) const {
-  worker.before = sight.words;
+  worker.saved = false;  // Most sights stay as they are and need no copy.
   worker.rows.assign(layers_.size(), sight.swept ? Interval{0, -1} : Interval{});
   if (sight.swept) {
     uncover(sight, changes, worker.rows);
-    if (!sight.words.empty() && !changes.filled.empty()) shade(sight, changes);
+    if (!sight.words.empty() && !changes.filled.empty()) shade(sight, changes, worker);
   } else {
+    worker.save(sight.words);
     sight.words.clear();
     sight.hidden_by.clear();
   }
@@ -248,6 +250,7 @@ void RunningTally::refresh(Sight& sight, const Changes& changes, Worker& worker)
   if (again) ++(sight.swept ? worker.partly_swept : worker.swept);
   sweep(sight, worker);
   sight.swept = true;
+  if (!worker.saved) return;
   compare(worker.before, sight.words,
           [&](std::size_t word, std::uint64_t added, std::uint64_t removed) {
             add_to(worker.gains, word, added, 1);
@@ -264,8 +267,11 @@ void RunningTally::sweep(Sight& sight, Worker& worker) const {
     const Interval rows = worker.rows[i];
     const bool again = !rows.empty(), fresh = !layer.fresh.empty();
     if (!again && !fresh) continue;
-    if (!swept) found.restart(sight.hidden_by);
-    swept = true;
+    if (!swept) {
+      worker.save(sight.words);
+      found.restart(sight.hidden_by);
+      swept = true;
+    }
     found.word_begin = static_cast<std::int64_t>(layer.word_begin);
     if (again) {
       const std::int64_t row_words = map_->row_words();
@@ -322,7 +328,7 @@ RunningTally::Box RunningTally::box_of(const Sight& sight, const Layer& layer) c
 }
 
 // Takes the shadows of what became blocked out of the words.
-void RunningTally::shade(Sight& sight, const Changes& changes) const {
+void RunningTally::shade(Sight& sight, const Changes& changes, Worker& worker) const {
   const Voxel u = sight.u.v;
   const int ny = map_->grid().ny;
   for (const Layer& layer : layers_) {
@@ -336,12 +342,12 @@ void RunningTally::shade(Sight& sight, const Changes& changes) const {
       const std::uint32_t end = row(std::min(y.last, ny - 1) + 1);
       for (std::uint32_t i = row(std::max(y.first, 0)); i < end; ++i)
         if (changes.filled[i].x >= x.first && changes.filled[i].x <= x.last)
-          shade(sight, layer, changes.filled[i]);
+          shade(sight, layer, changes.filled[i], worker);
     }
   }
 }
 
-void RunningTally::shade(Sight& sight, const Layer& layer, Voxel filled) const {
+void RunningTally::shade(Sight& sight, const Layer& layer, Voxel filled, Worker& worker) const {
   const Voxel u = sight.u.v;
   const Interval rows = rows_behind(u, filled, layer.z);
   if (rows.empty() || filled == u) return;
@@ -360,7 +366,9 @@ void RunningTally::shade(Sight& sight, const Layer& layer, Voxel filled) const {
     const int y = static_cast<int>(in_layer / row_words);
     const int x = 64 * static_cast<int>(in_layer % row_words);
     const std::uint64_t shadow = shadow_of(u, filled, {x, y, layer.z}) & word->bits;
-    hides |= shadow != 0;
+    if (shadow == 0) continue;
+    hides = true;
+    worker.save(sight.words);
     word->bits &= ~shadow;
   }
   if (!hides) return;

@@ -87,9 +87,15 @@ class RunningTally {
   struct Worker {
     Sweep<SeenSet> sweep;
     std::vector<std::uint32_t> gains;  // To be added to counts_, modulo 2^32.
-    std::vector<SeenWord> before;
+    std::vector<SeenWord> before;      // The sight's words before the first change, if saved.
+    bool saved{};
     std::vector<Interval> rows;  // Per layer: to be swept again.
     std::size_t swept{}, partly_swept{};
+
+    void save(const std::vector<SeenWord>& words) {
+      if (!saved) before = words;
+      saved = true;
+    }
   };
 
   void forget();
@@ -99,9 +105,9 @@ class RunningTally {
   void refresh(const Changes& changes);
   void refresh(Sight& sight, const Changes& changes, Worker& worker) const;
   void uncover(Sight& sight, const Changes& changes, std::vector<Interval>& rows) const;
-  void shade(Sight& sight, const Changes& changes) const;
+  void shade(Sight& sight, const Changes& changes, Worker& worker) const;
   Box box_of(const Sight& sight, const Layer& layer) const;
-  void shade(Sight& sight, const Layer& layer, Voxel filled) const;
+  void shade(Sight& sight, const Layer& layer, Voxel filled, Worker& worker) const;
   void sweep(Sight& sight, Worker& worker) const;
   std::vector<std::uint32_t> answer(const std::vector<Voxel>& candidates) const;
   std::size_t bytes() const;
