@@ -36,6 +36,39 @@ class Scanner {
   virtual Task<Result<ScanCloud>> scan() = 0;
 };
 
+// A laser scanner that measures in one plane.
+class ProfileScanner {
+ public:
+  virtual ~ProfileScanner() = default;
+  // Profiles come only between start and stop.
+  virtual Task<Result<void>> start() = 0;
+  virtual Task<Result<void>> stop() = 0;
+  // The oldest that nobody took yet; a bounded number waits, then the oldest are lost and counted.
+  virtual Task<Result<Profile>> next_profile() = 0;
+};
+
+// Turns a scanner about the z axis of S.
+class PanUnit {
+ public:
+  virtual ~PanUnit() = default;
+  // Ends when the unit stands there. Fails with errc::argument_out_of_domain beyond its limits.
+  virtual Task<Result<void>> move_to(double angle_rad) = 0;
+  // Begins to turn towards `angle_rad` at that rate (positive) and returns at once.
+  virtual Task<Result<void>> turn_to(double angle_rad, double rate_radps) = 0;
+  virtual Task<Result<void>> halt() = 0;
+  virtual Task<Result<PanReading>> read() = 0;
+};
+
+// Supply, relays and safety inputs.
+class PowerIo {
+ public:
+  virtual ~PowerIo() = default;
+  virtual Task<Result<BatteryState>> battery() = 0;
+  virtual Task<Result<SafetyInputs>> inputs() = 0;
+  // Goes off by itself after `hold` unless repeated.
+  virtual Task<Result<void>> set_relay(int channel, bool on, Duration hold) = 0;
+};
+
 // Where no robot can drive, a person carries the scanner: asks for it to be set up at `wanted` and
 // returns where it then stands. Fails with errc::address_not_available when nobody can stand there.
 class Placement {

@@ -9,6 +9,7 @@
 #include <boost/system/result.hpp>
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace hal {
@@ -83,12 +84,55 @@ struct ScanPattern {
   std::size_t beams() const { return std::size_t{columns} * rows; }
 };
 
+// Where a beam starts and which way it goes, in S. The direction has length 1.
+struct Beam {
+  Eigen::Vector3f S_origin_m{0, 0, 0};
+  Eigen::Vector3f S_direction{1, 0, 0};
+};
+
 // One 3-D scan. ranges_m[column * rows + row] is the range along that beam in metres; 0 says that
 // nothing came back.
 struct ScanCloud {
   Time stamp{};
   ScanPattern pattern;
   std::vector<float> ranges_m;
+  // Where the beams really went, in the same order: a scanner that turns while it measures, or
+  // whose optics are beside the pan axis, keeps to the pattern only nearly. Empty: exactly the
+  // pattern, all from the origin of S.
+  std::vector<Beam> beams;
+};
+
+// One turn of a profile scanner's mirror, in the scanner's own frame L: x ahead, y left, beams in
+// the xy plane, angles counter-clockwise from x.
+struct Profile {
+  Time stamp{};            // Of the first beam, by our clock.
+  double beam_period_s{};  // From one beam to the next.
+  double angle_first_rad{};
+  double angle_step_rad{};
+  std::vector<float> ranges_m;     // 0: nothing came back.
+  std::vector<float> intensities;  // As the device counts; empty where it sends none.
+  std::uint64_t lost_before{};     // Profiles that went missing since the one before.
+};
+
+// Where the pan axis stood at some time between asking and the answer's arrival. Counter-clockwise
+// from S's x axis.
+struct PanReading {
+  Time asked{}, answered{};
+  double angle_rad{};
+};
+
+// What the robot's supply says; what it does not know is nothing.
+struct BatteryState {
+  Time stamp{};
+  std::optional<double> voltage_v, current_a, charge_percent, temperature_c, time_to_go_s;
+};
+
+// What the safety inputs say. Whatever is not surely released counts as pressed.
+struct SafetyInputs {
+  Time stamp{};
+  bool estop_pressed = true;
+  bool bumper_pressed = true;
+  bool reset_pressed = false;
 };
 
 }  // namespace hal
