@@ -99,7 +99,7 @@ struct ScanCloud {
   // Where the beams really went, in the same order: a scanner that turns while it measures, or
   // whose optics are beside the pan axis, keeps to the pattern only nearly. Empty: exactly the
   // pattern, all from the origin of S.
-  std::vector<Beam> beams;
+  std::vector<Beam> beams = {};
 };
 
 // One turn of a profile scanner's mirror, in the scanner's own frame L: x ahead, y left, beams in
