@@ -220,7 +220,7 @@ void RunningTally::refresh(const Changes& changes) {
                        .gains = std::vector<std::uint32_t>(counts_.size()),
                        .before = {},
                        .saved = false,
-                       .rows = {}});
+                       .openings = {}});
   constexpr std::size_t kPiece = 128;
   for_pieces(threads_, sights_.size(), kPiece, [&](int thread, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i)
@@ -236,18 +236,17 @@ void RunningTally::refresh(const Changes& changes) {
 
 void RunningTally::refresh(Sight& sight, const Changes& changes, Worker& worker) const {
   worker.saved = false;  // Most sights stay as they are and need no copy.
-  worker.rows.assign(layers_.size(), sight.swept ? Interval{0, -1} : Interval{});
+  worker.openings.clear();
   if (sight.swept) {
-    uncover(sight, changes, worker.rows);
+    uncover(sight, changes, worker.openings);
     if (!sight.words.empty() && !changes.filled.empty()) shade(sight, changes, worker);
   } else {
     worker.save(sight.words);
     sight.words.clear();
     sight.hidden_by.clear();
   }
-  const bool again = std::any_of(worker.rows.begin(), worker.rows.end(),
-                                 [](const Interval& r) { return !r.empty(); });
-  if (again) ++(sight.swept ? worker.partly_swept : worker.swept);
+  worker.swept += !sight.swept;
+  worker.partly_swept += !worker.openings.empty();
   sweep(sight, worker);
   sight.swept = true;
   if (!worker.saved) return;
@@ -258,56 +257,48 @@ void RunningTally::refresh(Sight& sight, const Changes& changes, Worker& worker)
           });
 }
 
-// Sweeps the rows again, and all rows for the new candidates.
+// Sweeps for everybody, or for whom the openings hid and for the new candidates.
 void RunningTally::sweep(Sight& sight, Worker& worker) const {
+  const auto is_fresh = [](const Layer& layer) { return !layer.fresh.empty(); };
+  if (sight.swept && worker.openings.empty() &&
+      std::none_of(layers_.begin(), layers_.end(), is_fresh))
+    return;
+  worker.save(sight.words);
   SeenSet& found = worker.sweep.sink();
-  bool swept = false;
-  for (std::size_t i = 0; i < layers_.size(); ++i) {
-    const Layer& layer = layers_[i];
-    const Interval rows = worker.rows[i];
-    const bool again = !rows.empty(), fresh = !layer.fresh.empty();
-    if (!again && !fresh) continue;
-    if (!swept) {
-      worker.save(sight.words);
-      found.restart(sight.hidden_by);
-      swept = true;
-    }
+  found.restart(sight.hidden_by);
+  for (const Layer& layer : layers_) {
     found.word_begin = static_cast<std::int64_t>(layer.word_begin);
-    if (again) {
-      const std::int64_t row_words = map_->row_words();
-      std::erase_if(sight.words, [&](const SeenWord& word) {
-        const std::int64_t in_layer = std::int64_t{word.word} - found.word_begin;
-        return in_layer >= rows.first * row_words &&
-               in_layer < (std::int64_t{rows.last} + 1) * row_words;
-      });
-      worker.sweep.add(sight.u, *layer.all, rows);
+    if (!sight.swept) {
+      worker.sweep.add(sight.u, *layer.all);
+      continue;
     }
-    if (fresh && sight.swept) worker.sweep.add(sight.u, *layer.new_ones);
+    if (!worker.openings.empty()) {
+      for (Opening& opening : worker.openings)
+        opening.rows = rows_behind(sight.u.v, {0, opening.y, opening.z}, layer.z);
+      worker.sweep.add_behind(sight.u, *layer.all, worker.openings);
+    }
+    if (is_fresh(layer)) worker.sweep.add(sight.u, *layer.new_ones);
   }
-  if (!swept) return;
   sight.words.insert(sight.words.end(), found.words.begin(), found.words.end());
   normalize(sight.words);
   sight.hidden_by.assign(found.hidden_by.begin(), found.hidden_by.end());
 }
 
-// The rows of each layer behind what hid sight.u and does so no more.
+// What hid sight.u and does so no more. Who sees it already goes on to see it.
 void RunningTally::uncover(Sight& sight, const Changes& changes,
-                           std::vector<Interval>& rows) const {
-  const VoxelGrid& grid = map_->grid();
-  const int row_bytes = 8 * map_->row_words();
+                           std::vector<Opening>& openings) const {
+  const int ny = map_->grid().ny, row_bytes = 8 * map_->row_words();
   std::erase_if(sight.hidden_by, [&](std::uint32_t byte) {
-    if (changes.emptied[byte] == 0) return false;
-    const int row = static_cast<int>(byte / static_cast<std::uint32_t>(row_bytes));
-    const Voxel v{0, row % grid.ny, row / grid.ny};
-    for (std::size_t i = 0; i < layers_.size(); ++i) {
-      Interval behind = rows_behind(sight.u.v, v, layers_[i].z);
-      behind = {std::max(behind.first, 0), std::min(behind.last, grid.ny - 1)};
-      if (behind.empty()) continue;
-      rows[i] = rows[i].empty() ? behind
-                                : Interval{std::min(rows[i].first, behind.first),
-                                           std::max(rows[i].last, behind.last)};
-    }
-    return true;
+    const unsigned emptied = changes.emptied[byte];
+    if (emptied == 0) return false;
+    const int in_row = static_cast<int>(byte) % row_bytes, row = static_cast<int>(byte) / row_bytes;
+    openings.push_back({.y = row % ny,
+                        .z = row / ny,
+                        .x_first = 8 * in_row + std::countr_zero(emptied),
+                        .x_last = 8 * in_row + 31 - std::countl_zero(emptied),
+                        .rows = {}});
+    const std::uint64_t word = map_->empty_row(row % ny, row / ny)[in_row / 8];
+    return (word >> (8 * (in_row % 8)) & 0xFF) == 0xFF;  // Else a part of it may still hide some.
   });
 }
 

@@ -89,7 +89,7 @@ class RunningTally {
     std::vector<std::uint32_t> gains;  // To be added to counts_, modulo 2^32.
     std::vector<SeenWord> before;      // The sight's words before the first change, if saved.
     bool saved{};
-    std::vector<Interval> rows;  // Per layer: to be swept again.
+    std::vector<Opening> openings;  // Hid the present boundary voxel from someone.
     std::size_t swept{}, partly_swept{};
 
     void save(const std::vector<SeenWord>& words) {
@@ -104,7 +104,7 @@ class RunningTally {
   void note_boundary(const std::vector<BoundaryVoxel>& boundary);
   void refresh(const Changes& changes);
   void refresh(Sight& sight, const Changes& changes, Worker& worker) const;
-  void uncover(Sight& sight, const Changes& changes, std::vector<Interval>& rows) const;
+  void uncover(Sight& sight, const Changes& changes, std::vector<Opening>& openings) const;
   void shade(Sight& sight, const Changes& changes, Worker& worker) const;
   Box box_of(const Sight& sight, const Layer& layer) const;
   void shade(Sight& sight, const Layer& layer, Voxel filled, Worker& worker) const;

@@ -93,56 +93,105 @@ const LayerPaths& Sweep<Sink>::paths(int c) {
 }
 
 template <class Sink>
-void Sweep<Sink>::add(const BoundaryVoxel* begin, const BoundaryVoxel* end,
-                      const CandidateLayer& layer, Interval rows) {
-  if (begin == end) return;
-  const Voxel at = begin->v;
-  const int c = layer.z() - at.z;
-  const LayerPaths& paths = this->paths(std::abs(c));
+typename Sweep<Sink>::Rays Sweep<Sink>::rays_to(Voxel u, const CandidateLayer& layer) const {
+  const int c = layer.z() - u.z;
   Rays rays{};
+  rays.u = u;
   rays.c = std::abs(c);
-  rays.row_u = std::int64_t{at.z} * grid_.ny + at.y;
+  rays.row_u = std::int64_t{u.z} * grid_.ny + u.y;
   rays.z_sign = c < 0 ? -1 : 1;
   rays.step_z = rays.z_sign * grid_.ny;
-  rays.u = at;
-  rows.first = std::max(rows.first, at.y - paths.rows() + 1);
-  rows.last = std::min(rows.last, at.y + paths.rows() - 1);
+  return rays;
+}
+
+template <class Sink>
+template <class Visit>
+void Sweep<Sink>::for_rows(Rays rays, std::size_t us, const CandidateLayer& layer, Interval rows,
+                           const Visit& visit) {
+  const LayerPaths& paths = this->paths(rays.c);
+  const int y = rays.u.y;
+  rows.first = std::max(rows.first, y - paths.rows() + 1);
+  rows.last = std::min(rows.last, y + paths.rows() - 1);
   const auto first = std::lower_bound(layer.rows().begin(), layer.rows().end(), rows.first,
-                                      [](const CandidateLayer::Row& r, int y) { return r.y < y; });
+                                      [](const Row& r, int at) { return r.y < at; });
   for (auto row = first; row != layer.rows().end() && row->y <= rows.last; ++row) {
-    const int b = row->y - at.y, y_sign = b < 0 ? -1 : 1;
-    if (row == first || y_sign != rays.y_sign)
-      last_.assign(2 * static_cast<std::size_t>(end - begin), {});
+    const int y_sign = row->y < y ? -1 : 1;
+    if (row == first || y_sign != rays.y_sign) last_.assign(2 * us, {});
     rays.y_sign = y_sign;
     rays.step_y = y_sign;
-    rays.b = std::abs(b);
+    rays.b = std::abs(row->y - y);
     rays.path = paths.path(rays.b);
-    const RowLimits& limits = paths.limits(rays.b);
-    const int y_face = b == 0 ? 0 : b > 0 ? kFaceYPlus : kFaceYMinus;
-    const int z_face = c == 0 ? 0 : c > 0 ? kFaceZPlus : kFaceZMinus;
-    LastRuns* last = last_.data();
-    for (const BoundaryVoxel* u = begin; u != end; ++u, last += 2) {
-      rays.u.x = u->v.x;
-      const int faced_last = std::max((u->faces & y_face) != 0 ? limits.y_face_last : -1,
-                                      (u->faces & z_face) != 0 ? limits.z_face_last : -1);
-      const auto admit = [&](Face x_face) {
-        const int from = std::max(limits.in_range_first, limits.x_face_first);
-        return Admitted{
-            {limits.in_range_first, from},
-            {std::min(faced_last, limits.in_range_last),
-             (u->faces & x_face) != 0 ? std::min(limits.x_face_last, limits.in_range_last) : -1}};
-      };
-      add_side<1>(rays, layer, *row, admit(kFaceXPlus), last[0]);
-      add_side<-1>(rays, layer, *row, admit(kFaceXMinus), last[1]);
-    }
+    rays.limits = &paths.limits(rays.b);
+    visit(rays, *row);
   }
 }
 
 template <class Sink>
+void Sweep<Sink>::add(const BoundaryVoxel* begin, const BoundaryVoxel* end,
+                      const CandidateLayer& layer) {
+  if (begin == end) return;
+  constexpr Interval kAll[2];
+  const auto us = static_cast<std::size_t>(end - begin);
+  for_rows(rays_to(begin->v, layer), us, layer, {}, [&](Rays& rays, const Row& row) {
+    LastRuns* last = last_.data();
+    for (const BoundaryVoxel* u = begin; u != end; ++u, last += 2) {
+      rays.u.x = u->v.x;
+      add_row(rays, *u, layer, row, kAll, last);
+    }
+  });
+}
+
+template <class Sink>
+void Sweep<Sink>::add_behind(const BoundaryVoxel& u, const CandidateLayer& layer,
+                             const std::vector<Opening>& openings) {
+  Interval rows{INT32_MAX, -1};
+  for (const Opening& opening : openings)
+    if (!opening.rows.empty())
+      rows = {std::min(rows.first, opening.rows.first), std::max(rows.last, opening.rows.last)};
+  if (rows.empty()) return;
+  for_rows(rays_to(u.v, layer), 1, layer, rows, [&](const Rays& rays, const Row& row) {
+    Interval within[2]{{INT32_MAX, -1}, {INT32_MAX, -1}};  // |a|, of the plus and the minus side.
+    for (const Opening& opening : openings) {
+      if (row.y < opening.rows.first || row.y > opening.rows.last) continue;
+      const int j = (opening.y - u.v.y) * rays.y_sign, k = (opening.z - u.v.z) * rays.z_sign;
+      const PathTimes* const times = j < 0 || k < 0 ? nullptr : rays.path.times_in(j, k);
+      if (times == nullptr) continue;
+      const auto widen = [&](Interval& side, int r0, int r1) {
+        if (r1 < 0) return;
+        side = {std::min(side.first, times->shadow_first(r0)),
+                std::max(side.last, times->shadow_last(r1))};
+      };
+      widen(within[0], opening.x_first - u.v.x, opening.x_last - u.v.x);
+      widen(within[1], u.v.x - opening.x_last, u.v.x - opening.x_first);
+    }
+    add_row(rays, u, layer, row, within, last_.data());
+  });
+}
+
+// The candidates of one row that are within, in |a| on either side.
+template <class Sink>
+void Sweep<Sink>::add_row(const Rays& rays, const BoundaryVoxel& u, const CandidateLayer& layer,
+                          const Row& row, const Interval within[2], LastRuns last[2]) {
+  const RowLimits& limits = *rays.limits;
+  const Face y_face = rays.y_sign > 0 ? kFaceYPlus : kFaceYMinus;
+  const Face z_face = rays.z_sign > 0 ? kFaceZPlus : kFaceZMinus;
+  const int faced_last = std::max(rays.b != 0 && (u.faces & y_face) != 0 ? limits.y_face_last : -1,
+                                  rays.c != 0 && (u.faces & z_face) != 0 ? limits.z_face_last : -1);
+  const auto admit = [&](Face x_face) {
+    const int from = std::max(limits.in_range_first, limits.x_face_first);
+    return Admitted{
+        {limits.in_range_first, from},
+        {std::min(faced_last, limits.in_range_last),
+         (u.faces & x_face) != 0 ? std::min(limits.x_face_last, limits.in_range_last) : -1}};
+  };
+  add_side<1>(rays, layer, row, admit(kFaceXPlus), within[0], last[0]);
+  add_side<-1>(rays, layer, row, admit(kFaceXMinus), within[1], last[1]);
+}
+
+template <class Sink>
 template <int kSide>
-void Sweep<Sink>::add_side(const Rays& rays, const CandidateLayer& layer,
-                           const CandidateLayer::Row& row, const Admitted& admitted,
-                           LastRuns& last_runs) {
+void Sweep<Sink>::add_side(const Rays& rays, const CandidateLayer& layer, const Row& row,
+                           const Admitted& admitted, Interval within, LastRuns& last_runs) {
   // In |a|, from the first to the last admitted candidate of the row; a = 0 is on the plus side.
   int first = INT32_MAX, last = -1;
   for (int i = 0; i < 2; ++i)
@@ -152,8 +201,8 @@ void Sweep<Sink>::add_side(const Rays& rays, const CandidateLayer& layer,
     }
   const int nearest = kSide > 0 ? row.x_first - rays.u.x : rays.u.x - row.x_last;
   const int farthest = kSide > 0 ? row.x_last - rays.u.x : rays.u.x - row.x_first;
-  first = std::max({first, nearest, kSide > 0 ? 0 : 1});
-  last = std::min(last, farthest);
+  first = std::max({first, nearest, within.first, kSide > 0 ? 0 : 1});
+  last = std::min({last, farthest, within.last});
   if (first > last) return;
   const Known known = known_shadows<kSide>(rays, {first, last}, last_runs);
   first = known.open.first;

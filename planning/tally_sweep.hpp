@@ -72,6 +72,13 @@ class CandidateLayer {
   std::size_t tally_end_;
 };
 
+// Voxels x_first .. x_last of row y of level z that block no more.
+struct Opening {
+  int y{}, z{};
+  int x_first{}, x_last{};
+  Interval rows;  // Of the candidates' layer: where they can have hidden anyone.
+};
+
 // One thread's sweep. What it finds goes to a sink with
 //     void seen(const CandidateLayer&, const CandidateLayer::Row&, int x, std::uint64_t bits)
 // bit i: the candidate at x + i sees the boundary voxel; each candidate comes at most once;
@@ -85,13 +92,13 @@ class Sweep {
   Sweep(const VoxelGrid& grid, const BlockedRows& blocked, const ViewRule& rule, Sink sink)
       : grid_(grid), blocked_(blocked), rule_(rule), sink_(std::move(sink)) {}
 
-  void add(const BoundaryVoxel& u, const CandidateLayer& layer, Interval rows = {}) {
-    add(&u, &u + 1, layer, rows);
-  }
+  void add(const BoundaryVoxel& u, const CandidateLayer& layer) { add(&u, &u + 1, layer); }
+  // Only candidates that the openings hid, and maybe others between these.
+  void add_behind(const BoundaryVoxel& u, const CandidateLayer& layer,
+                  const std::vector<Opening>& openings);
   // Several of one y and z at once, so that they share a row's paths while these are at hand. What
   // the sink gets does not tell them apart.
-  void add(const BoundaryVoxel* begin, const BoundaryVoxel* end, const CandidateLayer& layer,
-           Interval rows = {});
+  void add(const BoundaryVoxel* begin, const BoundaryVoxel* end, const CandidateLayer& layer);
   Sink& sink() { return sink_; }
   const Sink& sink() const { return sink_; }
 
@@ -107,6 +114,7 @@ class Sweep {
     int b, c;                            // In voxels.
     int y_sign, z_sign;
     LayerPaths::Path path;
+    const RowLimits* limits;
   };
   // Blocked voxels x from r0 to r1 (from u, in the direction of a) of a row that is j and k steps
   // along y and z from u.
@@ -134,10 +142,18 @@ class Sweep {
     void measure();
   };
 
+  using Row = CandidateLayer::Row;
   const LayerPaths& paths(int c);
+  Rays rays_to(Voxel u, const CandidateLayer& layer) const;
+  // Calls visit() with the rays of each row in range in turn.
+  template <class Visit>
+  void for_rows(Rays rays, std::size_t us, const CandidateLayer& layer, Interval rows,
+                const Visit& visit);
+  void add_row(const Rays& rays, const BoundaryVoxel& u, const CandidateLayer& layer,
+               const Row& row, const Interval within[2], LastRuns last[2]);
   template <int kSide>
-  void add_side(const Rays& rays, const CandidateLayer& layer, const CandidateLayer::Row& row,
-                const Admitted& admitted, LastRuns& last_runs);
+  void add_side(const Rays& rays, const CandidateLayer& layer, const Row& row,
+                const Admitted& admitted, Interval within, LastRuns& last_runs);
   template <int kSide>
   void cast(const Rays& rays, LastRuns& last_runs, Live& live);
   template <int kSide>

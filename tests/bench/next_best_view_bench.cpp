@@ -245,6 +245,9 @@ void RunningTally(benchmark::State& state) {
     for (std::size_t i = 1; i < questions.size(); ++i)
       pairs +=
           sum(running.update(questions[i].map, questions[i].boundary, questions[i].candidates));
+    state.counters["swept"] = static_cast<double>(running.work().swept);
+    state.counters["partly_swept"] = static_cast<double>(running.work().partly_swept);
+    state.counters["kept"] = static_cast<double>(running.work().kept);
     state.counters["kept_mb"] = static_cast<double>(running.work().bytes) / 1e6;
   }
   finish(state, questions.back(), pairs);
