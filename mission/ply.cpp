@@ -103,12 +103,32 @@ FileResult<std::size_t> parse_comments(std::string_view& text, PlyCloud& cloud,
 
 }  // namespace
 
+namespace {
+
+std::vector<Eigen::Vector3f> points_of_beams(const hal::ScanCloud& cloud,
+                                             const Eigen::Isometry3d& T_W_S) {
+  std::vector<Eigen::Vector3f> points;
+  points.reserve(cloud.ranges_m.size());
+  for (std::size_t i = 0; i < cloud.beams.size(); ++i) {
+    if (!(cloud.ranges_m[i] > 0)) continue;
+    const hal::Beam& beam = cloud.beams[i];
+    const Eigen::Vector3d S_point_m =
+        beam.S_origin_m.cast<double>() + cloud.ranges_m[i] * beam.S_direction.cast<double>();
+    points.push_back((T_W_S * S_point_m).cast<float>());
+  }
+  return points;
+}
+
+}  // namespace
+
 std::vector<Eigen::Vector3f> scan_points(const hal::ScanCloud& cloud,
                                          const Eigen::Isometry3d& T_W_S) {
   const hal::ScanPattern& pattern = cloud.pattern;
-  if (cloud.ranges_m.size() != pattern.beams()) {
+  if (cloud.ranges_m.size() != pattern.beams() ||
+      (!cloud.beams.empty() && cloud.beams.size() != pattern.beams())) {
     throw std::invalid_argument("a scan's ranges do not match its pattern");
   }
+  if (!cloud.beams.empty()) return points_of_beams(cloud, T_W_S);
   const std::size_t rows = pattern.rows;
   std::vector<double> cosine(rows), sine(rows);
   for (std::size_t row = 0; row < rows; ++row) {

@@ -98,7 +98,8 @@ struct Reach {
     if (above_floor_m) {
       const double climb = fan.climb(column, row);
       if (climb < 0) {
-        const double to_floor_m = std::max(0.0, *above_floor_m / -climb);
+        const double above_m = *above_floor_m + fan.start_up_m(column, row);
+        const double to_floor_m = std::max(0.0, above_m / -climb);
         if (to_floor_m < trusted_m) trusted_m = static_cast<float>(to_floor_m);
       }
     }
@@ -126,8 +127,9 @@ bool meets(const LatticePoint& from, const LatticePoint& to, Voxel v) {
          within.clip(from.z, to.z, low(v.z), low(v.z + 1)) && !within.empty();
 }
 
-BeamFan::BeamFan(const VoxelGrid& grid, const hal::ScanPattern& pattern,
+BeamFan::BeamFan(const VoxelGrid& grid, const hal::ScanCloud& scan,
                  const Eigen::Isometry3d& T_W_S) {
+  const hal::ScanPattern& pattern = scan.pattern;
   const auto usable = [](double first, double step, std::uint32_t count) {
     return std::isfinite(first) && std::isfinite(step) && (count < 2 || step != 0);
   };
@@ -159,6 +161,38 @@ BeamFan::BeamFan(const VoxelGrid& grid, const hal::ScanPattern& pattern,
   base_ = {base.x(), base.y(), base.z()};
   lattice_m_ = 1 / per_m;
   scanner_ = {on_lattice(base_[0]), on_lattice(base_[1]), on_lattice(base_[2])};
+  lattice_S_ = R_W_S * per_m;
+  W_up_S_ = R_W_S.row(2).transpose();
+  if (!scan.beams.empty()) measure_beams(scan);
+}
+
+void BeamFan::measure_beams(const hal::ScanCloud& scan) {
+  const hal::ScanPattern& pattern = scan.pattern;
+  if (scan.beams.size() != pattern.beams())
+    throw std::invalid_argument("scan: " + std::to_string(scan.beams.size()) + " beams for " +
+                                std::to_string(pattern.beams()) + " of the pattern");
+  double chord2_max = 0, offset2_max = 0;
+  std::size_t i = 0;
+  for (std::uint32_t column = 0; column < pattern.columns; ++column) {
+    const double azimuth = pattern.azimuth_first_rad + column * pattern.azimuth_step_rad;
+    const double cos = std::cos(azimuth), sin = std::sin(azimuth);
+    for (std::uint32_t row = 0; row < pattern.rows; ++row, ++i) {
+      const hal::Beam& beam = scan.beams[i];
+      const Eigen::Vector3d direction = beam.S_direction.cast<double>();
+      if (!(std::abs(direction.squaredNorm() - 1) < 1e-5) || !beam.S_origin_m.allFinite())
+        throw std::invalid_argument("scan: beam " + std::to_string(i) +
+                                    " has no direction of length 1, or no origin");
+      const Eigen::Vector3d nominal(rows_[row].cos * cos, rows_[row].cos * sin, rows_[row].sin);
+      chord2_max = std::max(chord2_max, (direction - nominal).squaredNorm());
+      offset2_max = std::max(offset2_max, beam.S_origin_m.cast<double>().squaredNorm());
+    }
+  }
+  if (offset2_max > kOffsetMax_m * kOffsetMax_m)
+    throw std::invalid_argument("scan: a beam starts too far from the scanner");
+  // The chord of an angle, with room for the direction's rounding.
+  deviation_max_rad_ = 2 * std::asin(std::min(std::sqrt(chord2_max) / 2, 1.0)) + 1e-5;
+  offset_max_m_ = std::sqrt(offset2_max);
+  beams_ = scan.beams.data();
 }
 
 std::vector<float> trusted_no_returns(const hal::ScanCloud& scan, int window, double range_max_m,

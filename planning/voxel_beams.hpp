@@ -30,15 +30,24 @@ inline Voxel voxel_of(const LatticePoint& p) {
 // Whether the segment meets the inside of the voxel. Exact for coordinates within +-2^30.
 bool meets(const LatticePoint& from, const LatticePoint& to, Voxel v);
 
-// The end points of all beams of one scan. Sines and cosines once per column and row.
+// The start and end points of all beams of one scan: sines and cosines of the pattern once per
+// column and row, or each beam's own origin and direction.
 class BeamFan {
  public:
-  // Throws std::invalid_argument for a pattern or pose that has no meaning in this grid.
-  BeamFan(const VoxelGrid& grid, const hal::ScanPattern& pattern, const Eigen::Isometry3d& T_W_S);
+  // Throws std::invalid_argument for a pattern or pose that has no meaning in this grid, and for
+  // beams that are not one for each of the pattern's, not of length 1 or start further than
+  // kOffsetMax from the scanner. Refers to the scan.
+  BeamFan(const VoxelGrid& grid, const hal::ScanCloud& scan, const Eigen::Isometry3d& T_W_S);
 
-  const LatticePoint& scanner() const { return scanner_; }
+  static constexpr double kOffsetMax_m = 2;
+
+  // Where the beam starts.
+  LatticePoint start(std::uint32_t column, std::uint32_t row) const {
+    return beams_ == nullptr ? scanner_ : at(beam(column, row), 0);
+  }
   // Where the beam is after range_m.
   LatticePoint end(std::uint32_t column, std::uint32_t row, float range_m) const {
+    if (beams_ != nullptr) return at(beam(column, row), range_m);
     const Direction& h = columns_[column];
     const double along_m = range_m * rows_[row].cos;
     const double up_m = range_m * rows_[row].sin;
@@ -48,8 +57,17 @@ class BeamFan {
   }
   // How fast the beam climbs in W: metres per metre of range.
   double climb(std::uint32_t column, std::uint32_t row) const {
+    if (beams_ != nullptr) return W_up_S_.dot(beam(column, row).S_direction.cast<double>());
     return (rows_[row].cos * columns_[column][2] + rows_[row].sin * up_[2]) * lattice_m_;
   }
+  // How much higher in W than the scanner the beam starts.
+  double start_up_m(std::uint32_t column, std::uint32_t row) const {
+    return beams_ == nullptr ? 0 : W_up_S_.dot(beam(column, row).S_origin_m.cast<double>());
+  }
+
+  // No beam leaves the pattern's direction by more than this, nor starts further from the scanner.
+  double deviation_max_rad() const { return deviation_max_rad_; }
+  double offset_max_m() const { return offset_max_m_; }
 
  private:
   using Direction = std::array<double, 3>;  // 1/1024 voxels per metre, in W.
@@ -62,12 +80,27 @@ class BeamFan {
     return 2 * floor + 1;
   }
 
+  const hal::Beam& beam(std::uint32_t column, std::uint32_t row) const {
+    return beams_[std::size_t{column} * rows_.size() + row];
+  }
+  LatticePoint at(const hal::Beam& beam, float range_m) const {
+    const Eigen::Vector3d q =
+        lattice_S_ * (beam.S_origin_m.cast<double>() + range_m * beam.S_direction.cast<double>());
+    return {on_lattice(base_[0] + q.x()), on_lattice(base_[1] + q.y()),
+            on_lattice(base_[2] + q.z())};
+  }
+  void measure_beams(const hal::ScanCloud& scan);
+
   std::vector<Direction> columns_;
   std::vector<Elevation> rows_;
   Direction up_{};
   Direction base_{};
   double lattice_m_{};
   LatticePoint scanner_;
+  const hal::Beam* beams_ = nullptr;  // Null: the pattern's.
+  Eigen::Matrix3d lattice_S_;         // From metres in S to lattice steps in W.
+  Eigen::Vector3d W_up_S_;
+  double deviation_max_rad_ = 0, offset_max_m_ = 0;
 };
 
 // How far to believe each beam that came back with nothing, in metres; 0 for beams with a return

@@ -99,6 +99,8 @@ BeamCarver::BeamCarver(const VoxelGrid& grid, const hal::ScanPattern& pattern,
       tiles_(make_tiles(pattern, reach_m, threads)),
       R_S_W_(T_W_S.linear().transpose()),
       W_scanner_((T_W_S.translation() - grid.W_min_m) / grid.voxel_m),
+      deviation_rad_(fan.deviation_max_rad()),
+      offset_(fan.offset_max_m() / grid.voxel_m),
       column_step_rad_(usable_step(pattern.azimuth_step_rad, pattern.columns)),
       row_step_rad_(usable_step(pattern.elevation_step_rad, pattern.rows)) {
   S_corner_ = R_S_W_ * (Eigen::Vector3d::Constant(0.5) - W_scanner_);
@@ -119,7 +121,7 @@ BeamCarver::BeamCarver(const VoxelGrid& grid, const hal::ScanPattern& pattern,
 
 BeamCarver::Words BeamCarver::reachable_words(int y, int z) const {
   const double dy = y + 0.5 - W_scanner_.y(), dz = z + 0.5 - W_scanner_.z();
-  const double reach = reach_max_ + 1;
+  const double reach = reach_max_ + offset_ + 1;
   const double rest = reach * reach - dy * dy - dz * dz;
   if (reach_max_ == 0 || rest < 0) return {0, 0};
   const double half = std::sqrt(rest) + 1;
@@ -136,7 +138,7 @@ std::uint64_t BeamCarver::crossed(int word, int y, int z, std::uint64_t wanted) 
   for (std::uint64_t left = wanted; left != 0; left &= left - 1) {
     const int i = std::countr_zero(left);
     const float distance = sight.distance[i];
-    if (distance > static_cast<float>(reach_max_ + kHalfDiagonal + kSlack)) continue;
+    if (distance > static_cast<float>(reach_max_ + offset_ + kHalfDiagonal + kSlack)) continue;
     if (surely_crossed(distance, sight.azimuth_rad[i], sight.elevation_rad[i]) ||
         search({64 * word + i, y, z}, sight.azimuth_rad[i], sight.elevation_rad[i]))
       result |= std::uint64_t{1} << i;
@@ -181,11 +183,15 @@ bool BeamCarver::surely_crossed(float distance, float azimuth_rad, float elevati
   const float d_azimuth = std::abs(from_first - column * static_cast<float>(column_step_rad_));
   const float d_elevation = std::abs(from_row - row * static_cast<float>(row_step_rad_));
   // The way along the sphere, first in elevation, then in azimuth, is no shorter than the angle.
-  const float angle = d_elevation + d_azimuth + static_cast<float>(2 * kAngleSlack);
-  if (angle * distance > static_cast<float>(kHalfSide)) return false;
+  const float angle =
+      d_elevation + d_azimuth + static_cast<float>(deviation_rad_ + 2 * kAngleSlack);
+  const float offset = static_cast<float>(offset_);
+  if (angle * distance + offset > static_cast<float>(kHalfSide)) return false;
+  if (offset > 0 && distance < 2 * offset + 1) return false;  // It may start beyond the voxel.
   const ReachTiles::Tile& tile = tiles_.at(static_cast<int>(column) / ReachTiles::kSide,
                                            static_cast<int>(row) / ReachTiles::kSide);
-  return tile.min_m >= (distance + static_cast<float>(kSlack)) * static_cast<float>(grid_.voxel_m);
+  return tile.min_m >=
+         (distance + offset + static_cast<float>(kSlack)) * static_cast<float>(grid_.voxel_m);
 }
 
 bool BeamCarver::search(Voxel v, double azimuth_rad, double elevation_rad) const {
@@ -200,9 +206,9 @@ bool BeamCarver::search(Voxel v, double azimuth_rad, double elevation_rad) const
 bool BeamCarver::search_around(Voxel v, const Sight& sight, double azimuth_rad,
                                double elevation_rad) const {
   double angle = 2 * kPi, azimuth_angle = 2 * kPi;
-  const double sine = (kHalfDiagonal + kSlack) / sight.distance;
+  const double sine = (kHalfDiagonal + offset_ + kSlack) / sight.distance;
   if (sine < 1) {
-    angle = arc_sine_above(sine) + kAngleSlack;
+    angle = arc_sine_above(sine) + deviation_rad_ + kAngleSlack;
     const double flat = std::sqrt(sight.x * sight.x + sight.y * sight.y) / sight.distance;
     if (angle < 0.999 * flat) azimuth_angle = arc_sine_above(angle / flat) + kAngleSlack;
   }
@@ -219,7 +225,8 @@ bool BeamCarver::search_around(Voxel v, const Sight& sight, double azimuth_rad,
 
 bool BeamCarver::search_window(Voxel v, const Sight& sight, Span columns, Span rows) const {
   constexpr int side = ReachTiles::kSide;
-  const auto near_m = static_cast<float>((sight.distance - kHalfDiagonal - kSlack) * grid_.voxel_m);
+  const auto near_m =
+      static_cast<float>((sight.distance - offset_ - kHalfDiagonal - kSlack) * grid_.voxel_m);
   const bool wide = columns.last - columns.first > 4 * side || rows.last - rows.first > 4 * side;
   for (int tile_column = columns.first / side; tile_column <= columns.last / side; ++tile_column)
     for (int tile_row = rows.first / side; tile_row <= rows.last / side; ++tile_row) {
@@ -238,7 +245,7 @@ bool BeamCarver::search_window(Voxel v, const Sight& sight, Span columns, Span r
 // Whether the voxel's sphere meets the cone around the tile's beams.
 bool BeamCarver::may_meet(const Sight& sight, int tile_column, int tile_row) const {
   constexpr int side = ReachTiles::kSide;
-  const double sine = (kHalfDiagonal + kSlack) / sight.distance;
+  const double sine = (kHalfDiagonal + offset_ + kSlack) / sight.distance;
   if (sine >= 1) return true;
   const double middle = (side - 1) / 2.0;
   const double azimuth =
@@ -246,7 +253,7 @@ bool BeamCarver::may_meet(const Sight& sight, int tile_column, int tile_row) con
   const double elevation =
       pattern_.elevation_first_rad + (tile_row * side + middle) * row_step_rad_;
   const double radius = middle * (std::abs(column_step_rad_) + std::abs(row_step_rad_));
-  const double limit = radius + std::asin(sine) + kAngleSlack;
+  const double limit = radius + std::asin(sine) + deviation_rad_ + kAngleSlack;
   if (limit >= kPi) return true;
   const double along =
       std::cos(elevation) * (std::cos(azimuth) * sight.x + std::sin(azimuth) * sight.y) +
@@ -256,8 +263,12 @@ bool BeamCarver::may_meet(const Sight& sight, int tile_column, int tile_row) con
 
 bool BeamCarver::search_tile(Voxel v, const Sight& sight, Span columns, Span rows) const {
   const double distance2 = sight.distance * sight.distance;
-  const auto near_m = static_cast<float>((sight.distance - kHalfDiagonal - kSlack) * grid_.voxel_m);
-  const double outside = kHalfDiagonal * kHalfDiagonal + kSlack * (1 + 1e-6 * distance2);
+  const auto near_m =
+      static_cast<float>((sight.distance - offset_ - kHalfDiagonal - kSlack) * grid_.voxel_m);
+  // A beam beside the pattern's passes the centre at that distance at least, less what it is off.
+  const double off = offset_ + deviation_rad_ * (sight.distance + offset_ + 1);
+  const double near = kHalfDiagonal + off;
+  const double outside = near * near + kSlack * (1 + 1e-6 * distance2);
   for (int column = columns.first; column <= columns.last; ++column) {
     const auto c = static_cast<std::uint32_t>(column);
     const Eigen::Vector2d& flat = column_direction_[c];
@@ -267,8 +278,8 @@ bool BeamCarver::search_tile(Voxel v, const Sight& sight, Span columns, Span row
       if (reach_m[row] <= 0 || reach_m[row] < near_m) continue;
       const auto r = static_cast<std::uint32_t>(row);
       const double along = row_direction_[r].x() * flat_along + row_direction_[r].y() * sight.z;
-      if (distance2 - along * along > outside && sight.distance > 1) continue;
-      if (meets(fan_.scanner(), fan_.end(c, r, reach_m[row]), v)) return true;
+      if (distance2 - along * along > outside && sight.distance > 1 + off) continue;
+      if (meets(fan_.start(c, r), fan_.end(c, r, reach_m[row]), v)) return true;
     }
   }
   return false;

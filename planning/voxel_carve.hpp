@@ -79,6 +79,8 @@ class BeamCarver {
   Eigen::Matrix3d R_S_W_;
   Eigen::Vector3d W_scanner_;  // In voxels from the box's corner.
   double reach_max_{};         // In voxels.
+  double deviation_rad_{};     // Of any beam from the pattern's direction, at most,
+  double offset_{};            // and of its start from the scanner, in voxels.
   double column_step_rad_{}, row_step_rad_{};
   bool over_the_pole_{};  // Some elevations are beyond +-90 deg.
   std::vector<Eigen::Vector2d> column_direction_;

@@ -97,7 +97,7 @@ bool BeamCounts::foliage(Voxel v, const FoliageRule& rule) const {
 
 void BeamCounts::add(const hal::ScanCloud& scan, const Eigen::Isometry3d& T_W_S,
                      const InsertConfig& config) {
-  const BeamFan fan(grid_, scan.pattern, T_W_S);
+  const BeamFan fan(grid_, scan, T_W_S);
   const BeamReach reach = beam_reach(scan, grid_, T_W_S, fan, config);
   const int threads = std::clamp(config.threads, 1, kThreadsMax);
   std::vector<std::vector<Count>> others(static_cast<std::size_t>(threads) - 1);
@@ -109,7 +109,8 @@ void BeamCounts::add(const hal::ScanCloud& scan, const Eigen::Isometry3d& T_W_S,
     for (std::uint32_t row = 0; row < rows; ++row, ++beam) {
       if (!(reach.reach_m[beam] > 0)) continue;
       const LatticePoint end = fan.end(column, row, reach.reach_m[beam]);
-      for_passed(grid_, fan.scanner(), end, [&](Voxel v) { count_one(counts[index(v)].passes); });
+      for_passed(grid_, fan.start(column, row), end,
+                 [&](Voxel v) { count_one(counts[index(v)].passes); });
       const Voxel last = voxel_of(end);
       if (scan.ranges_m[beam] > 0 && grid_.contains(last)) count_one(counts[index(last)].hits);
     }

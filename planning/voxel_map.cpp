@@ -180,7 +180,7 @@ void VoxelMap::grow_z(int nz) {
 InsertReport VoxelMap::insert(const hal::ScanCloud& scan, const Eigen::Isometry3d& T_W_S,
                               const InsertConfig& config) {
   const VoxelGrid kept = kept_grid();
-  const BeamFan fan(kept, scan.pattern, T_W_S);
+  const BeamFan fan(kept, scan, T_W_S);
   const BeamReach reach = beam_reach(scan, kept, T_W_S, fan, config);
   InsertReport report = reach.counted;
 

@@ -171,10 +171,10 @@ octomap::Pointcloud end_points(const planning::BeamFan& fan, const planning::Bea
 // The same beams into OctoMap, as its manual does it.
 void InsertIntoOctomap(benchmark::State& state) {
   const Mission& m = mission();
-  const planning::BeamFan fan(grid(state), m.scans[0].pattern, m.poses[0]);
+  const planning::BeamFan fan(grid(state), m.scans[0], m.poses[0]);
   const octomap::Pointcloud cloud =
       end_points(fan, planning::beam_reach(m.scans[0], grid(state), m.poses[0], fan, m.config));
-  const planning::LatticePoint start = fan.scanner();
+  const planning::LatticePoint start = fan.start(0, 0);
   const octomap::point3d origin(static_cast<float>(static_cast<double>(start.x) / 2048),
                                 static_cast<float>(static_cast<double>(start.y) / 2048),
                                 static_cast<float>(static_cast<double>(start.z) / 2048));

@@ -91,8 +91,9 @@ TEST(VoxelWalk, MeetsExactlyTheVoxelsOfTheCrossings) {
 TEST(BeamFan, EndsWhereTheTransformedPointIs) {
   Random random(3);
   for (int i = 0; i < 200; ++i) {
-    const RandomScan s = random_scan(random);
-    const BeamFan fan(s.grid, s.scan.pattern, s.T_W_S);
+    RandomScan s = random_scan(random);
+    s.scan.beams.clear();
+    const BeamFan fan(s.grid, s.scan, s.T_W_S);
     const auto column = static_cast<std::uint32_t>(
         uniform_int(random, 0, static_cast<int>(s.scan.pattern.columns) - 1));
     const auto row = static_cast<std::uint32_t>(
@@ -113,6 +114,52 @@ TEST(BeamFan, EndsWhereTheTransformedPointIs) {
     EXPECT_TRUE((end.x & 1) != 0 && (end.y & 1) != 0 && (end.z & 1) != 0);
     EXPECT_NEAR(fan.climb(column, row), (s.T_W_S.linear() * direction).z(), 1e-12);
   }
+}
+
+TEST(BeamFan, TakesEachBeamFromItsOwnStart) {
+  Random random(4);
+  for (int i = 0; i < 200; ++i) {
+    RandomScan s = random_scan(random);
+    s.scan.beams.clear();
+    worlds::bend(s.scan, random);
+    const BeamFan fan(s.grid, s.scan, s.T_W_S);
+    const auto column = static_cast<std::uint32_t>(
+        uniform_int(random, 0, static_cast<int>(s.scan.pattern.columns) - 1));
+    const auto row = static_cast<std::uint32_t>(
+        uniform_int(random, 0, static_cast<int>(s.scan.pattern.rows) - 1));
+    const hal::Beam& beam = s.scan.beams[std::size_t{column} * s.scan.pattern.rows + row];
+    const double range_m = uniform(random, 0, 100);
+    const auto expect_at = [&](const LatticePoint& point, double along_m) {
+      const Eigen::Vector3d S_point_m =
+          beam.S_origin_m.cast<double>() + along_m * beam.S_direction.cast<double>();
+      const Eigen::Vector3d q = (s.T_W_S * S_point_m - s.grid.W_min_m) / s.grid.voxel_m * 2048;
+      EXPECT_NEAR(static_cast<double>(point.x), q.x(), 1.1);
+      EXPECT_NEAR(static_cast<double>(point.y), q.y(), 1.1);
+      EXPECT_NEAR(static_cast<double>(point.z), q.z(), 1.1);
+    };
+    expect_at(fan.start(column, row), 0);
+    expect_at(fan.end(column, row, static_cast<float>(range_m)), range_m);
+    EXPECT_NEAR(fan.climb(column, row), (s.T_W_S.linear() * beam.S_direction.cast<double>()).z(),
+                1e-12);
+    EXPECT_NEAR(fan.start_up_m(column, row),
+                (s.T_W_S.linear() * beam.S_origin_m.cast<double>()).z(), 1e-12);
+  }
+}
+
+TEST(BeamFan, RefusesBeamsThatMakeNoSense) {
+  hal::ScanCloud scan = beam(5);
+  const VoxelGrid grid{{0, 0, 0}, 1, 10, 10, 10};
+  const Eigen::Isometry3d pose = worlds::upright({5, 5, 5}, 0);
+  scan.beams.resize(2);
+  EXPECT_THROW(BeamFan(grid, scan, pose), std::invalid_argument) << "one too many";
+  scan.beams = {{{0, 0, 0}, {0.9F, 0, 0}}};
+  EXPECT_THROW(BeamFan(grid, scan, pose), std::invalid_argument) << "not of length 1";
+  scan.beams = {{{0, 0, NAN}, {1, 0, 0}}};
+  EXPECT_THROW(BeamFan(grid, scan, pose), std::invalid_argument) << "starts nowhere";
+  scan.beams = {{{3, 0, 0}, {1, 0, 0}}};
+  EXPECT_THROW(BeamFan(grid, scan, pose), std::invalid_argument) << "starts elsewhere";
+  scan.beams = {{{1, 0, 0}, {1, 0, 0}}};
+  EXPECT_NO_THROW(BeamFan(grid, scan, pose));
 }
 
 TEST(VoxelMap, StartsUnseenAndIsUnseenOutside) {
@@ -325,7 +372,7 @@ TEST(VoxelMap, CountsTheReturnsInEachLayerAboveTheBox) {
     Random random(seed + 7000);
     RandomScan s = random_scan(random);
     const int nz_kept = uniform_int(random, 1, 80);
-    const BeamFan fan(s.grid, s.scan.pattern, s.T_W_S);
+    const BeamFan fan(s.grid, s.scan, s.T_W_S);
     std::vector<std::uint64_t> above;
     std::size_t outside = 0;
     for (std::uint32_t c = 0; c < s.scan.pattern.columns; ++c)

@@ -110,12 +110,12 @@ inline float trusted(const hal::ScanCloud& scan, std::int64_t column, std::int64
   return nearest;
 }
 
-// Calls visit(end, has_return) for every beam that says something, in order.
+// Calls visit(start, end, has_return) for every beam that says something, in order.
 template <class Visit>
 void for_beams(const planning::VoxelGrid& grid, const hal::ScanCloud& scan,
                const Eigen::Isometry3d& T_W_S, const planning::InsertConfig& config,
                const Visit& visit) {
-  const planning::BeamFan fan(grid, scan.pattern, T_W_S);
+  const planning::BeamFan fan(grid, scan, T_W_S);
   const double turn = scan.pattern.columns * std::abs(scan.pattern.azimuth_step_rad);
   const bool wraps = std::abs(turn - 2 * M_PI) < std::abs(scan.pattern.azimuth_step_rad) / 2;
   const std::uint32_t rows = scan.pattern.rows;
@@ -124,7 +124,7 @@ void for_beams(const planning::VoxelGrid& grid, const hal::ScanCloud& scan,
       float range_m = scan.ranges_m[std::size_t{c} * rows + r];
       if (range_m != 0) {
         if (range_m > 0 && range_m >= config.range_min_m && range_m <= config.range_max_m)
-          visit(fan.end(c, r, range_m), true);
+          visit(fan.start(c, r), fan.end(c, r, range_m), true);
         continue;
       }
       if (!config.carve_no_return) continue;
@@ -133,10 +133,10 @@ void for_beams(const planning::VoxelGrid& grid, const hal::ScanCloud& scan,
         const double ground = (*config.ground_z_m - grid.W_min_m.z()) / grid.voxel_m;
         const double floor_m =
             grid.W_min_m.z() + grid.voxel_m * (std::ceil(ground - 1e-6) + 2.0 / 1024);
-        const double height_m = T_W_S.translation().z() - floor_m;
+        const double height_m = T_W_S.translation().z() - floor_m + fan.start_up_m(c, r);
         range_m = std::min(range_m, static_cast<float>(std::max(0.0, height_m / -fan.climb(c, r))));
       }
-      if (range_m > 0) visit(fan.end(c, r, range_m), false);
+      if (range_m > 0) visit(fan.start(c, r), fan.end(c, r, range_m), false);
     }
 }
 
@@ -157,12 +157,11 @@ void walk_beam(const planning::VoxelGrid& grid, const planning::LatticePoint& st
 inline void insert(VoxelMap& map, const hal::ScanCloud& scan, const Eigen::Isometry3d& T_W_S,
                    const planning::InsertConfig& config) {
   const planning::VoxelGrid& grid = map.grid();
-  const planning::LatticePoint start = planning::BeamFan(grid, scan.pattern, T_W_S).scanner();
-  for_beams(grid, scan, T_W_S, config, [&](const planning::LatticePoint& end, bool has_return) {
+  for_beams(grid, scan, T_W_S, config, [&](const auto&, const auto& end, bool has_return) {
     if (has_return && grid.contains(planning::voxel_of(end)))
       map.set(planning::voxel_of(end), VoxelState::seen_occupied);
   });
-  for_beams(grid, scan, T_W_S, config, [&](const planning::LatticePoint& end, bool) {
+  for_beams(grid, scan, T_W_S, config, [&](const auto& start, const auto& end, bool) {
     walk_beam(grid, start, end, [&](Voxel v) {
       if (map.at(v) == VoxelState::unseen) map.set(v, VoxelState::seen_empty);
     });
@@ -175,8 +174,7 @@ struct BeamCounts {
 
   void add(const planning::VoxelGrid& grid, const hal::ScanCloud& scan,
            const Eigen::Isometry3d& T_W_S, const planning::InsertConfig& config) {
-    const planning::LatticePoint start = planning::BeamFan(grid, scan.pattern, T_W_S).scanner();
-    for_beams(grid, scan, T_W_S, config, [&](const planning::LatticePoint& end, bool has_return) {
+    for_beams(grid, scan, T_W_S, config, [&](const auto& start, const auto& end, bool has_return) {
       const Voxel last = planning::voxel_of(end);
       if (has_return && grid.contains(last)) ++hits[last];
       walk_beam(grid, start, end, [&](Voxel v) {
@@ -191,7 +189,7 @@ struct BeamCounts {
 inline void insert_densely(VoxelMap& map, const hal::ScanCloud& scan,
                            const Eigen::Isometry3d& T_W_S, const planning::InsertConfig& config) {
   const planning::VoxelGrid& grid = map.grid();
-  const planning::BeamFan fan(grid, scan.pattern, T_W_S);
+  const planning::BeamFan fan(grid, scan, T_W_S);
   const planning::BeamReach reach = planning::beam_reach(scan, grid, T_W_S, fan, config);
   const std::uint32_t rows = scan.pattern.rows;
   std::vector<std::uint8_t> crossed(grid.size());
@@ -201,11 +199,11 @@ inline void insert_densely(VoxelMap& map, const hal::ScanCloud& scan,
                static_cast<std::size_t>(grid.nx) +
            static_cast<std::size_t>(v.x);
   };
-  const planning::LatticePoint start = fan.scanner();
   for (std::uint32_t c = 0; c < scan.pattern.columns; ++c)
     for (std::uint32_t r = 0; r < rows; ++r) {
       const std::size_t beam = std::size_t{c} * rows + r;
       if (!(reach.reach_m[beam] > 0)) continue;
+      const planning::LatticePoint start = fan.start(c, r);
       const planning::LatticePoint end = fan.end(c, r, reach.reach_m[beam]);
       if (scan.ranges_m[beam] > 0 && grid.contains(planning::voxel_of(end)))
         map.set(planning::voxel_of(end), VoxelState::seen_occupied);

@@ -85,6 +85,27 @@ inline Eigen::Isometry3d random_pose(Random& random, const planning::VoxelGrid& 
   return pose;
 }
 
+// Beams off the pattern by something: a scanner that turns as it measures, mounted askew, with its
+// optics beside the pan axis; or worse.
+inline void bend(hal::ScanCloud& scan, Random& random) {
+  const hal::ScanPattern& pattern = scan.pattern;
+  const double skew_rad = uniform(random, -1, 1) * pattern.azimuth_step_rad;
+  const double off_rad = uniform_int(random, 0, 1) * uniform(random, 0, 0.3);
+  const double off_m = uniform_int(random, 0, 3) == 0 ? 1 : uniform(random, 0, 0.2);
+  for (std::uint32_t column = 0; column < pattern.columns; ++column)
+    for (std::uint32_t row = 0; row < pattern.rows; ++row) {
+      const double azimuth = pattern.azimuth_first_rad + column * pattern.azimuth_step_rad +
+                             skew_rad * row / pattern.rows + uniform(random, -1, 1) * off_rad;
+      const double elevation = pattern.elevation_first_rad + row * pattern.elevation_step_rad +
+                               uniform(random, -1, 1) * off_rad;
+      const Eigen::Vector3d direction(std::cos(elevation) * std::cos(azimuth),
+                                      std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+      const Eigen::Vector3d origin(uniform(random, -1, 1), uniform(random, -1, 1),
+                                   uniform(random, -1, 1));
+      scan.beams.push_back({(off_m * origin).cast<float>(), direction.cast<float>().normalized()});
+    }
+}
+
 inline RandomScan random_scan(Random& random) {
   RandomScan result;
   const int sides[] = {1, 2, 7, 20, 33, 63, 64, 65, 130};
@@ -113,6 +134,7 @@ inline RandomScan random_scan(Random& random) {
     if (uniform_int(random, 0, 200) == 0) out = -1;
     result.scan.ranges_m.push_back(out);
   }
+  if (uniform_int(random, 0, 2) == 0) bend(result.scan, random);
   return result;
 }
 
