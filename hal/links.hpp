@@ -1,4 +1,10 @@
 // Links carry frames and bytes. Drivers use them; nothing above drivers/ does.
+//
+// For all links: a cancelled call throws boost::system::system_error(operation_aborted), and the
+// link stays usable. A link that is lost comes back by itself. Each loss is told once to whoever
+// receives; what was unread when the link came back is gone, and further calls to receive wait for
+// the link, so that a loop around receive() never spins. What is sent fails at once while the link
+// is lost: pause by the clock before trying again.
 #pragma once
 
 #include <cstdint>
@@ -50,7 +56,9 @@ class Datagrams {
   virtual Task<Result<Received>> receive(std::span<std::uint8_t> into) = 0;
 };
 
-// Modbus: 16-bit registers and coils of one unit.
+// Modbus: 16-bit registers and coils of one unit. Fails with errc::timed_out when the unit does not
+// answer, errc::not_connected when there is no connection, errc::bad_message for damaged replies;
+// a unit's exceptions are the values that drivers/modbus_errors.hpp lists.
 class Registers {
  public:
   using Range = RegisterRange;
@@ -60,7 +68,11 @@ class Registers {
   virtual Task<Result<std::vector<bool>>> read_coils(Range range) = 0;
   virtual Task<Result<std::vector<bool>>> read_discrete(Range range) = 0;
   virtual Task<Result<void>> write_register(std::uint16_t at, std::uint16_t value) = 0;
-  virtual Task<Result<void>> write_coil(std::uint16_t at, bool value) = 0;
+  // Function 5 with any value: some boards have more than on (0xFF00) and off (0).
+  virtual Task<Result<void>> write_coil_raw(std::uint16_t at, std::uint16_t value) = 0;
+  Task<Result<void>> write_coil(std::uint16_t at, bool on) {
+    return write_coil_raw(at, on ? 0xFF00 : 0);
+  }
 };
 
 }  // namespace hal
