@@ -187,6 +187,11 @@ void say(Fields& f, const GpsdError& v) {
   f.add("message", v.message);
 }
 
+void say(Fields& f, const GpsdDevices& v) {
+  for (const GpsdDevice& device : v.devices)
+    f.add("path", device.path).add("driver", device.driver).add("active", device.active);
+}
+
 template <class T>
 bool try_ubx(Message& out, const std::string& name, const std::optional<T>& value) {
   if (!value) return false;
@@ -240,7 +245,7 @@ class GnssOffline : public OfflineStream {
 };
 
 std::string_view say_gpsd(Message& out, ByteView line) {
-  constexpr const char* kNames[] = {"", "TPV", "SKY", "GST", "ATT", "VERSION", "ERROR"};
+  constexpr const char* kNames[] = {"", "TPV", "SKY", "GST", "ATT", "VERSION", "ERROR", "DEVICES"};
   const auto parsed = parse_gpsd(line);
   if (!parsed) return "no class";
   const auto* other = std::get_if<GpsdOther>(&*parsed);

@@ -39,6 +39,7 @@ enum class GnssQuality {
 struct GnssEpoch {
   std::optional<GnssDate> date;                // UTC
   std::optional<std::int64_t> time_of_day_ns;  // UTC
+  std::optional<std::uint32_t> itow_ms;        // Of the GPS week, where the receiver says it.
   int mode = 1;                                // 1 no fix, 2 plane, 3 with height.
   GnssQuality quality{};
   std::optional<ExactAngle> latitude, longitude;  // North and east positive.

@@ -117,6 +117,19 @@ GpsdSky read_sky(const Keys& in) {
   return sky;
 }
 
+GpsdDevices read_devices(const Keys& in) {
+  GpsdDevices list;
+  const json::value* items = in.find("devices");
+  if (items == nullptr || !items->is_array()) return list;
+  for (const json::value& item : items->get_array()) {
+    if (!item.is_object()) continue;
+    const Keys keys(item.get_object());
+    list.devices.push_back(
+        {keys.text("path"), keys.text("driver"), !keys.text("activated").empty()});
+  }
+  return list;
+}
+
 GpsdMessage read_message(const std::string& name, const Keys& in) {
   if (name == "TPV") return read_tpv(in);
   if (name == "SKY") return read_sky(in);
@@ -129,6 +142,7 @@ GpsdMessage read_message(const std::string& name, const Keys& in) {
                    in.real("pitch"),  in.real("roll"), in.real("yaw")};
   if (name == "VERSION")
     return GpsdVersion{in.text("release"), in.whole("proto_major"), in.whole("proto_minor")};
+  if (name == "DEVICES") return read_devices(in);
   if (name == "ERROR") return GpsdError{in.text("message")};
   return GpsdOther{name};
 }

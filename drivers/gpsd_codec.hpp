@@ -61,12 +61,19 @@ struct GpsdVersion {
 struct GpsdError {
   std::string message;
 };
-// DEVICES, WATCH, RTCM3 and whatever comes with a class of its own.
+struct GpsdDevice {
+  std::string path, driver;  // What gpsd takes it for: "u-blox", "NMEA0183"; empty: not yet known.
+  bool active{};
+};
+struct GpsdDevices {
+  std::vector<GpsdDevice> devices;
+};
+// WATCH, RTCM3 and whatever comes with a class of its own.
 struct GpsdOther {
   std::string name;
 };
-using GpsdMessage =
-    std::variant<GpsdOther, GpsdTpv, GpsdSky, GpsdGst, GpsdAtt, GpsdVersion, GpsdError>;
+using GpsdMessage = std::variant<GpsdOther, GpsdTpv, GpsdSky, GpsdGst, GpsdAtt, GpsdVersion,
+                                 GpsdError, GpsdDevices>;
 
 // Nothing where the line has no class.
 std::optional<GpsdMessage> parse_gpsd(ByteView line);

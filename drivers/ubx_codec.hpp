@@ -135,6 +135,9 @@ inline constexpr std::uint32_t kRateMeas_ms = 0x30210001, kRateNav = 0x30210002;
 inline constexpr std::uint32_t kNavPvtUart1 = 0x20910007, kNavPvtUsb = 0x20910009;
 inline constexpr std::uint32_t kNavHpposllhUart1 = 0x20910034, kUart1Baud = 0x40520001;
 inline constexpr std::uint32_t kUart1OutNmea = 0x10740002, kUart1InRtcm3 = 0x10730004;
+inline constexpr std::uint32_t kNavCovUart1 = 0x20910084, kNavEoeUart1 = 0x20910160;
+inline constexpr std::uint32_t kMonRfUart1 = 0x2091035A, kRxmRtcmUart1 = 0x20910269;
+inline constexpr std::uint32_t kUsbOutNmea = 0x10780002, kUsbInRtcm3 = 0x10770004;
 inline constexpr std::uint32_t kDynamicModel = 0x20110021;
 }  // namespace ubx_key
 enum class UbxLayer : std::uint8_t { ram = 1, battery = 2, flash = 4 };

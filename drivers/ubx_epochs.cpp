@@ -105,6 +105,7 @@ std::optional<std::int64_t> itow_of(const UbxMessage& m) {
 
 GnssEpoch epoch_of(const UbxNavPvt& pvt) {
   GnssEpoch epoch;
+  epoch.itow_ms = pvt.itow_ms;
   epoch.mode = mode_of(pvt);
   epoch.quality = quality_of(pvt);
   epoch.satellites_used = pvt.satellites;

@@ -19,6 +19,7 @@ constexpr int kTries = 3;
 constexpr hal::Duration kPause = 500ms;   // Between two starts.
 constexpr hal::Duration kGiveUp = 1s;     // Without a new sample: it may have been reset.
 constexpr double kRateMost_radps = 38.4;  // 2000 degrees/s and a tenth.
+constexpr double kGravity_mps2 = 9.81, kGravityOff_mps2 = 1.5;
 constexpr std::int64_t kReset_ns =
     1'000'000'000;  // Its clock goes back by so much only at a reset.
 
@@ -36,7 +37,8 @@ Vn100::Vn100(const Vn100Config& config, hal::Clock& clock, hal::ByteStream& stre
       set_baud_(std::move(set_baud)),
       reader_(stream, clock, look_vn100, kVn100FrameMax),
       health_({1.0 / config.settings.rate_hz, 0.1}),
-      baud_(config.settings.baud) {}
+      baud_(config.settings.baud),
+      gravity_mps2_(kGravity_mps2) {}
 
 hal::Task<void> Vn100::run() {
   state_ = DeviceState::starting;
@@ -146,6 +148,7 @@ hal::Task<void> Vn100::listen() {
   device_ns_.reset();
   line_rate_radps_.reset();
   start_again_ = false;
+  gravity_mps2_ = kGravity_mps2;
   new_sample_at_ = clock_.now();
   health_.restart(clock_.now(), reader_);
   co_await (read_samples() || watch());
@@ -212,12 +215,24 @@ bool Vn100::is_new(const Vn100Sample& sample) {
   return true;
 }
 
+// Gravity is known: a device that feels another one over a second has lost its calibration, and its
+// rates are not to be trusted either.
+bool Vn100::weighs_wrong(const Vn100Sample& sample) {
+  if (!sample.accel_mps2) return false;
+  const double kept = std::exp(-1.0 / config_.settings.rate_hz);
+  const double felt_mps2 = vn100_flu(*sample.accel_mps2).norm();
+  gravity_mps2_ = kept * gravity_mps2_ + (1 - kept) * felt_mps2;
+  if (!std::isfinite(gravity_mps2_)) gravity_mps2_ = 0;
+  return std::abs(gravity_mps2_ - kGravity_mps2) > kGravityOff_mps2;
+}
+
 void Vn100::handle_sample(const Vn100Sample& sample) {
   if (!sample.rate_radps || config_.settings.ascii == sample.startup_ns.has_value()) return;
   if (!is_new(sample)) return health_.repeated();
   new_sample_at_ = reader_.arrival();
   const double rate_radps = vn100_flu(*sample.rate_radps).z();
-  if (!(std::abs(rate_radps) <= kRateMost_radps)) return health_.implausible();
+  if (!(std::abs(rate_radps) <= kRateMost_radps) || weighs_wrong(sample))
+    return health_.implausible();
   if (!device_ns_) {
     health_.good();
     return deliver(reader_.arrival(), rate_radps);

@@ -53,6 +53,7 @@ class Vn100 final : public hal::Imu, public Device {
   void handle_line(ByteView frame);
   void handle_sample(const Vn100Sample& sample);
   bool is_new(const Vn100Sample& sample);
+  bool weighs_wrong(const Vn100Sample& sample);
   void deliver(hal::Time stamp, double yaw_rate_radps);
   void note_filter(std::uint16_t vpe_status);
 
@@ -72,6 +73,7 @@ class Vn100 final : public hal::Imu, public Device {
   std::optional<Vn100Vector> line_rate_radps_;  // Of the last line.
   std::optional<std::uint16_t> vpe_status_;
   hal::Time new_sample_at_{};
+  double gravity_mps2_;  // What it feels, smoothed over a second.
   bool start_again_ = false;
 };
 

@@ -52,6 +52,12 @@ struct Vn100Sample {
 // A binary frame that look_vn100() found.
 Vn100Sample decode_vn100_binary(ByteView frame);
 
+// The packet of group 1 with these fields of it (bits 0, 3, 5, 8 and 12 of `common` only), as the
+// device sends it; what the sample does not say is zero. For simulated units.
+Bytes encode_vn100_binary(std::uint16_t common, const Vn100Sample& sample);
+// "VNYMR,..." with its checksum.
+Bytes encode_vn100_line(const Vn100Sample& sample);
+
 // A line that look_vn100() found: "VNYMR" and the fields after it.
 struct Vn100Line {
   std::string type;

@@ -9,8 +9,8 @@ namespace {
 
 constexpr int kLineRates_hz[] = {1, 2, 4, 5, 10, 20, 25, 40, 50, 100, 200};
 constexpr int kLine_bytes = 122;  // "$VNYMR,...*hh\r\n" with every field at its width.
-constexpr int kPacket_bytes = 4 + 8 + 12 + 12 + 2 + 2;
-constexpr std::uint16_t kCommon = 1U << 0 | 1U << 3 | 1U << 5 | 1U << 12;
+constexpr int kPacket_bytes = 4 + 8 + 12 + 12 + 12 + 2 + 2;
+constexpr std::uint16_t kCommon = 1U << 0 | 1U << 3 | 1U << 5 | 1U << 8 | 1U << 12;
 
 template <class Range>
 bool has(const Range& range, int value) {

@@ -23,7 +23,7 @@ inline constexpr int kVn100Bauds[] = {115200, 921600, 57600, 460800, 230400, 384
 // Empty, or why no such device has these settings, with what would do.
 std::string vn100_settings_problem(const Vn100Settings& settings);
 
-// Time, attitude, yaw rate and the filter's state.
+// Time, attitude, rates, acceleration and the filter's state.
 Vn100Output vn100_output(const Vn100Settings& settings);
 
 struct Vn100Step {
