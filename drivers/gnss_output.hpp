@@ -4,9 +4,9 @@
 
 #include <optional>
 
-#include "drivers/bell.hpp"
 #include "drivers/clock_fit.hpp"
 #include "drivers/gnss_values.hpp"
+#include "drivers/outbox.hpp"
 #include "drivers/site_frame.hpp"
 #include "drivers/stream_health.hpp"
 

@@ -19,6 +19,7 @@ constexpr hal::Duration kPause = 500ms;
 constexpr hal::Duration kGiveUp = 5s;
 constexpr std::string_view kAskVersion = "?VERSION;\r\n";
 constexpr int kProtocolMajor = 3;
+constexpr int kReportsOfEpoch = 4;  // One for each sentence that says more, at most.
 
 constexpr Fault kOtherProtocol{1, "gpsd of another protocol", "its release is too old or too new",
                                "install gpsd 3.x"};
@@ -147,11 +148,20 @@ void GpsdClient::handle(const GpsdMessage& message) {
   } else if (const auto* tpv = std::get_if<GpsdTpv>(&message)) {
     if (!config_.device.empty() && tpv->device != config_.device) return;
     output_.troubles().clear(fault::kGone);
+    if (is_usual_repeat(tpv->time)) return;
     GnssEpoch epoch = epoch_of(*tpv);
     // Of gpsd, a circle of 95 %; one sigma of each axis is this much less.
     if (epoch.horizontal_accuracy_m) *epoch.horizontal_accuracy_m *= std::sqrt(2.0) / 2.4477;
     output_.add(epoch, reader_.arrival());
   }
+}
+
+// The first report of an epoch is used; a few more of it are usual. Without a time none is known.
+bool GpsdClient::is_usual_repeat(const std::string& time) {
+  const bool again = !time.empty() && time == report_time_;
+  report_times_ = again ? report_times_ + 1 : 1;
+  report_time_ = time;
+  return again && report_times_ <= kReportsOfEpoch;
 }
 
 hal::Task<void> GpsdClient::watch() {

@@ -40,6 +40,7 @@ class GpsdClient final : public hal::Gnss, public Device {
   void name_silence();
   void judge_devices();
   void handle(const GpsdMessage& message);
+  bool is_usual_repeat(const std::string& time);
 
   GpsdClientConfig config_;
   hal::Clock& clock_;
@@ -50,6 +51,8 @@ class GpsdClient final : public hal::Gnss, public Device {
   std::vector<GpsdDevice> devices_;
   DeviceState state_ = DeviceState::off;
   bool was_running_ = false;
+  std::string report_time_;  // Of the last report, and how often it came.
+  int report_times_ = 0;
 };
 
 }  // namespace drivers

@@ -1,10 +1,10 @@
 // VectorNav VN-100 on a serial port: the yaw rate, stamped by the device's clock fitted to ours.
 #pragma once
 
-#include "drivers/bell.hpp"
 #include "drivers/clock_fit.hpp"
 #include "drivers/device.hpp"
 #include "drivers/frame_reader.hpp"
+#include "drivers/outbox.hpp"
 #include "drivers/stream_health.hpp"
 #include "drivers/vn100_startup.hpp"
 #include "hal/devices.hpp"

@@ -1,38 +1,18 @@
-// Lets one coroutine wait for another, and hands values from a loop to whoever takes them.
+// Hands values from a device's loop to whoever takes them.
 #pragma once
 
 #include <boost/system/error_code.hpp>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <memory>
-#include <optional>
 #include <utility>
 
-#include "hal/task.hpp"
 #include "hal/values.hpp"
+#include "hal/wake.hpp"
 
 namespace drivers {
 
-class Bell {
- public:
-  Bell();
-  ~Bell();
-  Bell(const Bell&) = delete;
-  Bell& operator=(const Bell&) = delete;
-
-  // Ends with the next ring; at once when it rang since the last wait. One waits at a time. Throws
-  // boost::system::system_error(operation_aborted) when the caller is cancelled.
-  hal::Task<void> wait();
-  void ring();
-
- private:
-  struct Strokes;
-  std::unique_ptr<Strokes> strokes_;  // Made by the first to wait.
-  bool rang_ = false;
-};
-
-// At most `most` values wait; then the oldest is lost and counted. One takes at a time.
+// At most `most` values wait; then the oldest is lost and counted.
 template <class T>
 class Outbox {
  public:
@@ -45,15 +25,15 @@ class Outbox {
       values_.pop_front();
       ++lost_;
     }
-    bell_.ring();
+    wake_.notify();
   }
   // Whoever waits, or else the next to ask, learns it once; a value that comes takes it back.
   void fail(boost::system::error_code error) {
     error_ = error;
-    bell_.ring();
+    wake_.notify();
   }
   hal::Task<hal::Result<T>> take() {
-    while (values_.empty() && !error_) co_await bell_.wait();
+    while (values_.empty() && !error_) co_await wake_.wait();
     if (values_.empty()) co_return std::exchange(error_, {});
     T value = std::move(values_.front());
     values_.pop_front();
@@ -67,7 +47,7 @@ class Outbox {
   std::deque<T> values_;
   boost::system::error_code error_;
   std::uint64_t lost_{};
-  Bell bell_;
+  hal::Wake wake_;
 };
 
 }  // namespace drivers
