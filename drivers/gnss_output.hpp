@@ -40,6 +40,7 @@ class GnssOutput {
   void restart(hal::Time now, const FrameReader& reader);
   // An epoch as it arrived. True when it is new, whatever its quality.
   bool add(const GnssEpoch& epoch, hal::Time arrival);
+  void repeated() { health_.repeated(); }  // A message came again, or late.
   // Call at times: sets what is wrong with the stream. True when nothing new came for `patience`.
   bool stale(hal::Time now, const FrameReader& reader, hal::Duration patience);
   // To be told to whoever waits for a fix.

@@ -43,7 +43,9 @@ GpsdClient::GpsdClient(const GpsdClientConfig& config, hal::Clock& clock, hal::B
 hal::Task<void> GpsdClient::run() {
   state_ = DeviceState::starting;
   for (;;) {
-    if (co_await greet() && co_await watch_devices()) co_await listen();
+    const bool greeted = co_await greet();
+    const bool watches = co_await watch_devices(greeted);
+    if (watches) co_await listen();
     state_ = was_running_ ? DeviceState::lost : DeviceState::starting;
     if (was_running_) output_.fail(timed_out());
     co_await clock_.sleep_for(kPause);
@@ -63,14 +65,18 @@ hal::Task<std::optional<GpsdMessage>> GpsdClient::next_message(hal::Time deadlin
 
 // It greets by itself once; asked, it greets again on a connection that is not new.
 hal::Task<bool> GpsdClient::greet() {
-  reader_.forget();
-  if (const auto sent = co_await stream_.write(as_bytes(kAskVersion)); !sent) {
+  if (output_.troubles().has(fault::kGone)) reader_.forget();  // A new connection.
+  const auto sent = co_await stream_.write(as_bytes(kAskVersion));
+  if (!sent) {
     output_.troubles().set(fault::kGone, sent.error().message());
     co_return false;
   }
   const hal::Time deadline = clock_.now() + kGreeting;
-  while (const auto message = co_await next_message(deadline))
+  for (;;) {
+    const auto message = co_await next_message(deadline);
+    if (!message) break;
     if (const auto* version = std::get_if<GpsdVersion>(&*message)) co_return accept(*version);
+  }
   if (!output_.troubles().has(fault::kGone)) name_silence();
   co_return false;
 }
@@ -95,18 +101,21 @@ void GpsdClient::name_silence() {
   output_.troubles().set_if(!heard, fault::kSilent, "connected, but nothing answers");
 }
 
-hal::Task<bool> GpsdClient::watch_devices() {
+hal::Task<bool> GpsdClient::watch_devices(bool greeted) {
+  if (!greeted) co_return false;
   output_.troubles().clear(kError);
-  if (const auto sent = co_await stream_.write(as_bytes(kGpsdWatch)); !sent) {
+  const auto sent = co_await stream_.write(as_bytes(kGpsdWatch));
+  if (!sent) {
     output_.troubles().set(fault::kGone, sent.error().message());
     co_return false;
   }
   const hal::Time deadline = clock_.now() + kGreeting;
-  while (const auto message = co_await next_message(deadline)) {
+  for (;;) {
+    const auto message = co_await next_message(deadline);
+    if (!message) co_return false;
     handle(*message);
     if (std::holds_alternative<GpsdDevices>(*message)) co_return true;
   }
-  co_return false;
 }
 
 void GpsdClient::judge_devices() {
@@ -148,6 +157,7 @@ void GpsdClient::handle(const GpsdMessage& message) {
   } else if (const auto* tpv = std::get_if<GpsdTpv>(&message)) {
     if (!config_.device.empty() && tpv->device != config_.device) return;
     output_.troubles().clear(fault::kGone);
+    output_.troubles().clear(kNoReceiver);
     if (is_usual_repeat(tpv->time)) return;
     GnssEpoch epoch = epoch_of(*tpv);
     // Of gpsd, a circle of 95 %; one sigma of each axis is this much less.

@@ -31,7 +31,7 @@ class GpsdClient final : public hal::Gnss, public Device {
 
  private:
   hal::Task<bool> greet();
-  hal::Task<bool> watch_devices();
+  hal::Task<bool> watch_devices(bool greeted);
   hal::Task<std::optional<GpsdMessage>> next_message(hal::Time deadline);
   hal::Task<void> listen();
   hal::Task<void> read_reports();

@@ -51,7 +51,8 @@ NmeaGnss::NmeaGnss(const NmeaGnssConfig& config, hal::Clock& clock, hal::ByteStr
 hal::Task<void> NmeaGnss::run() {
   state_ = DeviceState::starting;
   for (;;) {
-    if (co_await find()) co_await listen();
+    const bool found = co_await find();
+    if (found) co_await listen();
     state_ = was_running_ ? DeviceState::lost : DeviceState::starting;
     if (was_running_) output_.fail(timed_out());
     co_await clock_.sleep_for(kPause);
@@ -66,11 +67,11 @@ hal::Task<bool> NmeaGnss::find() {
   reader_.forget();
   for (const int baud : bauds) {
     if (set_baud_ && !set_baud_(baud)) continue;
-    if (co_await hears_position(clock_.now() + kListen)) {
+    const bool heard = co_await hears_position(clock_.now() + kListen);
+    if (heard) {
       baud_ = baud;
       co_return true;
     }
-    if (output_.troubles().has(fault::kGone)) co_return false;
   }
   name_silence();
   co_return false;
@@ -80,18 +81,23 @@ hal::Task<bool> NmeaGnss::hears_position(hal::Time deadline) {
   Troubles& troubles = output_.troubles();
   for (;;) {
     const auto frame = co_await reader_.next(deadline);
-    troubles.set_if(!frame && frame.error() != timed_out(), fault::kGone,
-                    frame ? std::string() : frame.error().message());
+    // A lost line is told once; then it is silent until it is back.
+    if (!frame && frame.error() != timed_out()) troubles.set(fault::kGone, frame.error().message());
     if (!frame) co_return false;
+    troubles.clear(fault::kGone);
     if (gnss_kind(*frame) != GnssKind::nmea) continue;
     const auto sentence = parse_nmea(*frame);
     if (!sentence || !has_position(*sentence)) continue;
-    for (const Fault* over :
-         {&fault::kSilent, &fault::kWrongBaud, &fault::kOtherDevice, &kNoPosition})
-      troubles.clear(*over);
-    identity_ = {maker_of(sentence->talker), "NMEA 0183", {}, {}};
+    identify(*sentence);
     co_return true;
   }
+}
+
+void NmeaGnss::identify(const NmeaSentence& sentence) {
+  for (const Fault* over :
+       {&fault::kSilent, &fault::kWrongBaud, &fault::kOtherDevice, &kNoPosition})
+    output_.troubles().clear(*over);
+  identity_ = {maker_of(sentence.talker), "NMEA 0183", {}, {}};
 }
 
 void NmeaGnss::name_silence() {
@@ -104,7 +110,7 @@ void NmeaGnss::name_silence() {
   troubles.set_if(who.empty() && heard > 0, fault::kWrongBaud,
                   std::to_string(heard) + " bytes heard, no sentence, " +
                       (set_baud_ ? "at any bit rate" : "at the bit rate of the port"));
-  troubles.set_if(heard == 0, fault::kSilent, "nothing heard");
+  troubles.set_if(heard == 0 && !troubles.has(fault::kGone), fault::kSilent, "nothing heard");
 }
 
 hal::Task<void> NmeaGnss::listen() {
@@ -119,11 +125,11 @@ hal::Task<void> NmeaGnss::listen() {
 hal::Task<void> NmeaGnss::read_sentences() {
   bool open = false;
   for (;;) {
-    auto frame =
-        open ? co_await reader_.next(reader_.arrival() + kEpochGap) : co_await reader_.next();
+    const hal::Time deadline = open ? reader_.arrival() + kEpochGap : hal::Time::max();
+    const auto frame = co_await reader_.next(deadline);
     if (!frame && frame.error() == timed_out()) {
       open = false;
-      if (const auto epoch = epochs_.flush()) take({*epoch});
+      if (const auto epoch = epochs_.flush()) output_.add(*epoch, reader_.arrival());
       continue;
     }
     if (!frame) {

@@ -39,6 +39,7 @@ class NmeaGnss final : public hal::Gnss, public Device {
   hal::Task<void> listen();
   hal::Task<void> read_sentences();
   hal::Task<void> watch();
+  void identify(const NmeaSentence& sentence);
   void name_silence();
   void take(const std::vector<GnssEpoch>& epochs);
 

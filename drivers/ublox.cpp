@@ -60,7 +60,9 @@ hal::Task<void> Ublox::run() {
 hal::Task<void> Ublox::serve() {
   state_ = DeviceState::starting;
   for (;;) {
-    if (co_await find() && co_await configure()) co_await listen();
+    const bool found = co_await find();
+    const bool ready = co_await configure(found);
+    if (ready) co_await listen();
     state_ = was_running_ ? DeviceState::lost : DeviceState::starting;
     if (was_running_) output_.fail(timed_out());
     co_await clock_.sleep_for(kPause);
@@ -75,11 +77,14 @@ hal::Task<bool> Ublox::find() {
   reader_.forget();
   for (const int baud : bauds) {
     if (set_baud_ && !set_baud_(baud)) continue;
-    if (const auto sent = co_await send(encode_ubx(0x0A, 0x04)); !sent) {
+    const Bytes question = encode_ubx(0x0A, 0x04);
+    const auto sent = co_await send(question);
+    if (!sent) {
       output_.troubles().set(fault::kGone, sent.error().message());
       co_return false;
     }
-    if (!co_await ask_version(clock_.now() + kProbe)) continue;
+    const bool said = co_await ask_version(clock_.now() + kProbe);
+    if (!said) continue;
     baud_ = baud;
     co_return model_.has_value();
   }
@@ -128,11 +133,12 @@ void Ublox::name_silence() {
                         : "no answer at any bit rate");
 }
 
-hal::Task<bool> Ublox::configure() {
+hal::Task<bool> Ublox::configure(bool found) {
+  if (!found) co_return false;
   output_.troubles().clear(fault::kRefused);
   output_.troubles().clear(fault::kNotKept);
   for (const UbloxStep& step : ublox_steps(model_->dialect, config_.settings))
-    if (!co_await apply(step)) co_return false;
+    if (const bool applied = co_await apply(step); !applied) co_return false;
   co_return true;
 }
 
@@ -141,7 +147,8 @@ hal::Task<bool> Ublox::apply(const UbloxStep& step) {
   const std::string what = "to " + std::string(step.purpose);
   for (int attempt = 0; attempt < kTries && judged == UbloxAnswer::unrelated; ++attempt) {
     hal::Result<ByteView> frame = ByteView();
-    if (const auto sent = co_await send(step.request); !sent) frame = sent.error();
+    const auto sent = co_await send(step.request);
+    if (!sent) frame = sent.error();
     const hal::Time deadline = clock_.now() + kAck;
     while (frame && judged == UbloxAnswer::unrelated) {
       frame = co_await reader_.next(deadline);
@@ -160,6 +167,7 @@ hal::Task<bool> Ublox::apply(const UbloxStep& step) {
 
 hal::Task<void> Ublox::listen() {
   epochs_ = UbxEpochs();
+  itow_ms_.reset();
   output_.restart(clock_.now(), reader_);
   correction_at_ = clock_.now();
   state_ = DeviceState::running;
@@ -192,6 +200,8 @@ void Ublox::handle(const UbxMessage& message) {
   if (const auto pvt = ubx_nav_pvt(message)) {
     note(ubx_faults(*pvt), navigation_faults_, "NAV-PVT says so");
     output_.troubles().clear(fault::kGone);
+    if (itow_ms_ == pvt->itow_ms) output_.repeated();
+    itow_ms_ = pvt->itow_ms;
   }
   if (const auto rf = ubx_mon_rf(message)) {
     std::vector<const Fault*> found;
@@ -235,7 +245,11 @@ hal::Task<void> Ublox::pass_corrections() {
     }
     if (gnss_kind(*frame) != GnssKind::rtcm3) continue;
     passing_ = state_ == DeviceState::running;
-    const bool passed = passing_ && co_await stream_.write(*frame);
+    bool passed = false;
+    if (passing_) {
+      const auto sent = co_await stream_.write(*frame);
+      passed = sent.has_value();
+    }
     passing_ = false;
     ++(passed ? passed_ : dropped_);
     if (passed) correction_at_ = clock_.now();

@@ -41,7 +41,7 @@ class Ublox final : public hal::Gnss, public Device {
  private:
   hal::Task<void> serve();
   hal::Task<bool> find();
-  hal::Task<bool> configure();
+  hal::Task<bool> configure(bool found);
   hal::Task<bool> apply(const UbloxStep& step);
   hal::Task<bool> ask_version(hal::Time deadline);
   hal::Task<void> listen();
@@ -64,6 +64,7 @@ class Ublox final : public hal::Gnss, public Device {
   FrameReader reader_;
   GnssOutput output_;
   UbxEpochs epochs_;
+  std::optional<std::uint32_t> itow_ms_;  // Of the last NAV-PVT.
   Identity identity_;
   std::optional<UbloxModel> model_;
   DeviceState state_ = DeviceState::off;

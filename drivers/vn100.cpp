@@ -23,6 +23,10 @@ constexpr double kGravity_mps2 = 9.81, kGravityOff_mps2 = 1.5;
 constexpr std::int64_t kReset_ns =
     1'000'000'000;  // Its clock goes back by so much only at a reset.
 
+Vn100Step ask_model() {
+  return {"ask for its model", "VNRRG,1", "VNRRG", {"1"}, 1};
+}
+
 boost::system::error_code timed_out() {
   return boost::system::errc::make_error_code(boost::system::errc::timed_out);
 }
@@ -43,11 +47,19 @@ Vn100::Vn100(const Vn100Config& config, hal::Clock& clock, hal::ByteStream& stre
 hal::Task<void> Vn100::run() {
   state_ = DeviceState::starting;
   for (;;) {
-    if (co_await find() && co_await configure()) co_await listen();
+    co_await serve();
     if (state_ == DeviceState::running) state_ = DeviceState::lost;
     if (state_ == DeviceState::lost) samples_.fail(timed_out());
     co_await clock_.sleep_for(kPause);
   }
+}
+
+// From the start to the next loss.
+hal::Task<void> Vn100::serve() {
+  const bool found = co_await find();
+  if (!found) co_return;
+  const bool ready = co_await configure();
+  if (ready) co_await listen();
 }
 
 // At the rate of its last answer first: after a loss it is there most likely.
@@ -56,16 +68,14 @@ hal::Task<bool> Vn100::find() {
   if (set_baud_)
     for (const int baud : kVn100Bauds)
       if (baud != baud_) bauds.push_back(baud);
-  const Vn100Step who{"ask for its model", "VNRRG,1", "VNRRG", {"1"}, 1};
+  const Vn100Step who = ask_model();
   reader_.forget();
   for (const int baud : bauds) {
     if (set_baud_ && !set_baud_(baud)) continue;
     const auto answer = co_await ask(who, kProbe);
     if (answer && identify(who, *answer)) {
       baud_ = baud;
-      for (const Fault* found :
-           {&fault::kGone, &fault::kSilent, &fault::kWrongBaud, &fault::kOtherDevice})
-        troubles_.clear(*found);
+      clear_search();
       co_return true;
     }
     if (answer) co_return false;  // It answers: another model.
@@ -76,6 +86,12 @@ hal::Task<bool> Vn100::find() {
   }
   name_silence();
   co_return false;
+}
+
+void Vn100::clear_search() {
+  for (const Fault* over :
+       {&fault::kGone, &fault::kSilent, &fault::kWrongBaud, &fault::kOtherDevice})
+    troubles_.clear(*over);
 }
 
 void Vn100::name_silence() {
@@ -93,8 +109,9 @@ void Vn100::name_silence() {
 }
 
 hal::Task<hal::Result<Vn100Line>> Vn100::ask(const Vn100Step& step, hal::Duration patience) {
-  if (const auto sent = co_await stream_.write(vn100_request(step.request)); !sent)
-    co_return sent.error();
+  const Bytes request = vn100_request(step.request);
+  const auto sent = co_await stream_.write(request);
+  if (!sent) co_return sent.error();
   const hal::Time deadline = clock_.now() + patience;
   for (;;) {
     const auto frame = co_await reader_.next(deadline);
@@ -121,7 +138,7 @@ hal::Task<bool> Vn100::configure() {
   troubles_.clear(fault::kRefused);
   troubles_.clear(fault::kNotKept);
   for (const Vn100Step& step : vn100_steps(config_.settings))
-    if (!co_await apply(step)) co_return false;
+    if (const bool applied = co_await apply(step); !applied) co_return false;
   co_return true;
 }
 
@@ -147,6 +164,7 @@ hal::Task<void> Vn100::listen() {
   fit_ = ClockFit();
   device_ns_.reset();
   line_rate_radps_.reset();
+  line_accel_mps2_.reset();
   start_again_ = false;
   gravity_mps2_ = kGravity_mps2;
   new_sample_at_ = clock_.now();
@@ -201,11 +219,13 @@ void Vn100::handle_line(ByteView frame) {
   if (const auto sample = vn100_sample(*line)) handle_sample(*sample);
 }
 
-// Whether this is not what came before, once more or late.
+// Whether this is not what came before, once more or late. A line has no time, but noise.
 bool Vn100::is_new(const Vn100Sample& sample) {
   if (!sample.startup_ns) {
-    const bool fresh = line_rate_radps_ != sample.rate_radps;
+    const bool fresh =
+        line_rate_radps_ != sample.rate_radps || line_accel_mps2_ != sample.accel_mps2;
     line_rate_radps_ = sample.rate_radps;
+    line_accel_mps2_ = sample.accel_mps2;
     return fresh;
   }
   const auto device_ns = static_cast<std::int64_t>(*sample.startup_ns);

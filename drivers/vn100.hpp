@@ -40,6 +40,7 @@ class Vn100 final : public hal::Imu, public Device {
   std::uint64_t lost_samples() const { return samples_.lost(); }
 
  private:
+  hal::Task<void> serve();
   hal::Task<bool> find();
   hal::Task<bool> configure();
   hal::Task<bool> apply(const Vn100Step& step);
@@ -48,6 +49,7 @@ class Vn100 final : public hal::Imu, public Device {
   hal::Task<void> read_samples();
   hal::Task<void> watch();
   bool identify(const Vn100Step& step, const Vn100Line& line);
+  void clear_search();
   void name_silence();
   void handle(ByteView frame);
   void handle_line(ByteView frame);
@@ -69,8 +71,8 @@ class Vn100 final : public hal::Imu, public Device {
   DeviceState state_ = DeviceState::off;
   int baud_;
   ClockFit fit_;
-  std::optional<std::int64_t> device_ns_;       // Of the last sample.
-  std::optional<Vn100Vector> line_rate_radps_;  // Of the last line.
+  std::optional<std::int64_t> device_ns_;                         // Of the last sample.
+  std::optional<Vn100Vector> line_rate_radps_, line_accel_mps2_;  // Of the last line.
   std::optional<std::uint16_t> vpe_status_;
   hal::Time new_sample_at_{};
   double gravity_mps2_;  // What it feels, smoothed over a second.

@@ -52,8 +52,9 @@ hal::Task<void> GpsdUnit::run() {
 }
 
 hal::Task<void> GpsdUnit::say(const std::string& line, int kind) {
-  if (!co_await out_.write(drivers::as_bytes(line + "\r\n"), kind))
-    co_await clock_.sleep_for(kLinkPause);
+  const std::string whole = line + "\r\n";
+  const auto sent = co_await out_.write(drivers::as_bytes(whole), kind);
+  if (!sent) co_await clock_.sleep_for(kLinkPause);
 }
 
 hal::Task<void> GpsdUnit::answer_requests() {
@@ -75,16 +76,19 @@ hal::Task<void> GpsdUnit::answer_requests() {
   }
 }
 
+std::string GpsdUnit::version() const {
+  return formatted(R"({"class":"VERSION","release":"%s","rev":"%s","proto_major":%d,)"
+                   R"("proto_minor":14})",
+                   config_.release.c_str(), config_.release.c_str(), config_.protocol_major);
+}
+
 hal::Task<void> GpsdUnit::answer(std::string_view request) {
-  if (request.find("?VERSION") != std::string_view::npos)
-    co_await say(
-        formatted(R"({"class":"VERSION","release":"%s","rev":"%s","proto_major":%d,)"
-                  R"("proto_minor":14})",
-                  config_.release.c_str(), config_.release.c_str(), config_.protocol_major),
-        kVersion);
+  const std::string greeting = version(), list = devices();
+  const std::string watch = R"({"class":"WATCH","enable":true,"json":true})";
+  if (request.find("?VERSION") != std::string_view::npos) co_await say(greeting, kVersion);
   if (request.find("?WATCH=") == std::string_view::npos) co_return;
-  co_await say(devices(), kDevices);
-  co_await say(R"({"class":"WATCH","enable":true,"json":true})", kWatch);
+  co_await say(list, kDevices);
+  co_await say(watch, kWatch);
   watched_ = request.find("\"enable\":true") != std::string_view::npos;
 }
 

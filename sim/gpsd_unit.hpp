@@ -30,6 +30,7 @@ class GpsdUnit {
   hal::Task<void> answer(std::string_view request);
   hal::Task<void> stream();
   hal::Task<void> say(const std::string& line, int kind);
+  std::string version() const;
   std::string devices() const;
   std::string report(const GnssMoment& moment) const;
 

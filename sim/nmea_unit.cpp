@@ -90,9 +90,11 @@ hal::Task<void> NmeaUnit::run() {
     co_await source_.next_due(config_.source.rate_hz);
     if (faults_.silent()) continue;
     int kind = 0;
-    for (const std::string& sentence : nmea_sentences(source_.sample(), sky_, config_.form))
-      if (!co_await out_.write(drivers::as_bytes(sentence), kind++))
-        co_await clock_.sleep_for(kLinkPause);
+    const auto sentences = nmea_sentences(source_.sample(), sky_, config_.form);
+    for (const std::string& sentence : sentences) {
+      const auto sent = co_await out_.write(drivers::as_bytes(sentence), kind++);
+      if (!sent) co_await clock_.sleep_for(kLinkPause);
+    }
   }
 }
 

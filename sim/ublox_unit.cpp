@@ -122,7 +122,9 @@ hal::Task<void> UbloxUnit::answer_requests() {
 
 hal::Task<void> UbloxUnit::answer(ByteView frame) {
   if (gnss_kind(frame) == GnssKind::rtcm3) co_await take_correction(frame);
-  if (gnss_kind(frame) == GnssKind::ubx) co_await answer_ubx(parse_ubx(frame));
+  if (gnss_kind(frame) != GnssKind::ubx) co_return;
+  const std::vector<Bytes> replies = replies_to(parse_ubx(frame));
+  for (const Bytes& reply : replies) co_await send(reply);
 }
 
 // Each kind of message apart, as stuck repeats the first of each.
@@ -135,18 +137,22 @@ hal::Task<void> UbloxUnit::take_correction(ByteView frame) {
   if (value(kUart1InRtcm3) == 0 && value(kUsbInRtcm3) == 0) co_return;
   const std::uint16_t type = rtcm3_type(frame).value_or(0);
   corrections_.push_back(type);
-  if (sends(kRxmRtcmUart1)) co_await send(encode_ubx(UbxRxmRtcm{false, 2, 0, 0, type}));
+  if (!sends(kRxmRtcmUart1)) co_return;
+  const Bytes report = encode_ubx(UbxRxmRtcm{false, 2, 0, 0, type});
+  co_await send(report);
 }
 
-hal::Task<void> UbloxUnit::answer_ubx(const UbxMessage& message) {
+// What it says to a message, in order.
+std::vector<Bytes> UbloxUnit::replies_to(const UbxMessage& message) {
   if (message.cls == 0x0A && message.id == 0x04)
-    co_return co_await send(
-        encode_ubx(UbxMonVer{config_.software, config_.hardware, config_.extensions}));
-  if (message.cls != 0x06) co_return;
+    return {encode_ubx(UbxMonVer{config_.software, config_.hardware, config_.extensions})};
+  if (message.cls != 0x06) return {};
+  std::vector<Bytes> replies;
   const auto reply = asked(message);
-  if (reply) co_await send(*reply);
+  if (reply) replies.push_back(*reply);
   const bool accepted = reply || apply(message);
-  co_await send(encode_ubx(UbxAck{accepted, message.cls, message.id}));
+  replies.push_back(encode_ubx(UbxAck{accepted, message.cls, message.id}));
+  return replies;
 }
 
 // The answer to a question about settings.
@@ -196,37 +202,36 @@ hal::Task<void> UbloxUnit::stream() {
     co_await source_.next_due(1000.0 /
                               static_cast<double>(std::max<std::uint64_t>(1, value(kRateMeas_ms))));
     if (faults_.silent()) continue;
-    const GnssMoment moment = source_.sample();
     ++epochs_;
-    if (value(kUart1OutNmea) != 0 && value(kUsbOutNmea) != 0) co_await send_nmea(moment);
-    co_await send_epoch(moment);
+    const std::vector<Bytes> messages = messages_of(source_.sample());
+    for (const Bytes& message : messages) co_await send(message);
   }
 }
 
-hal::Task<void> UbloxUnit::send_nmea(const GnssMoment& moment) {
-  for (const std::string& sentence : nmea_sentences(moment, sky_, {}))
-    co_await send(Bytes(sentence.begin(), sentence.end()));
-}
-
-hal::Task<void> UbloxUnit::send_epoch(const GnssMoment& moment) {
+std::vector<Bytes> UbloxUnit::messages_of(const GnssMoment& moment) const {
   const bool fix = sky_.quality != GnssQuality::none;
-  if (sends(kNavPvtUart1)) co_await send(encode_ubx(nav_pvt(moment, sky_)));
+  std::vector<Bytes> messages;
+  if (value(kUart1OutNmea) != 0 && value(kUsbOutNmea) != 0)
+    for (const std::string& sentence : nmea_sentences(moment, sky_, {}))
+      messages.emplace_back(sentence.begin(), sentence.end());
+  if (sends(kNavPvtUart1)) messages.push_back(encode_ubx(nav_pvt(moment, sky_)));
   if (sends(kNavHpposllhUart1)) {
     UbxNavHpposllh high = nav_hpposllh(moment);
     high.invalid = !fix;
-    co_await send(encode_ubx(high));
+    messages.push_back(encode_ubx(high));
   }
   if (sends(kNavCovUart1)) {
     const auto variance_m2 = static_cast<float>(moment.sigma_m * moment.sigma_m);
-    co_await send(encode_ubx(UbxNavCov{
+    messages.push_back(encode_ubx(UbxNavCov{
         moment.itow_ms, fix, fix, {variance_m2, 0, 0, variance_m2, 0, 4 * variance_m2}, {}}));
   }
   if (sends(kMonRfUart1)) {
     UbxMonRf rf;
     rf.blocks.push_back({0, jamming_, antenna_, 1, 0, 90, 5000, 10});
-    co_await send(encode_ubx(rf));
+    messages.push_back(encode_ubx(rf));
   }
-  if (sends(kNavEoeUart1)) co_await send(encode_ubx(UbxNavEoe{moment.itow_ms}));
+  if (sends(kNavEoeUart1)) messages.push_back(encode_ubx(UbxNavEoe{moment.itow_ms}));
+  return messages;
 }
 
 }  // namespace sim

@@ -44,13 +44,12 @@ class UbloxUnit {
   hal::Task<void> answer_requests();
   hal::Task<void> stream();
   hal::Task<void> answer(drivers::ByteView frame);
-  hal::Task<void> answer_ubx(const drivers::UbxMessage& message);
   hal::Task<void> send(const drivers::Bytes& bytes);
-  hal::Task<void> send_epoch(const GnssMoment& moment);
-  hal::Task<void> send_nmea(const GnssMoment& moment);
   hal::Task<void> take_correction(drivers::ByteView frame);
   bool apply(const drivers::UbxMessage& message);
   bool apply_keys(const drivers::UbxMessage& message);
+  std::vector<drivers::Bytes> replies_to(const drivers::UbxMessage& message);
+  std::vector<drivers::Bytes> messages_of(const GnssMoment& moment) const;
   std::optional<drivers::Bytes> asked(const drivers::UbxMessage& message);
   bool sends(std::uint32_t key) const;
   std::uint64_t value(std::uint32_t key) const;

@@ -13,7 +13,8 @@ namespace {
 using boost::asio::experimental::awaitable_operators::operator&&;
 using drivers::whole_number;
 
-constexpr double kGravity_mps2 = 9.81;
+constexpr double kGravity_mps2 = 9.81, kAccelSigma_mps2 = 0.02;
+constexpr std::uint64_t kNoiseSource = 201;
 constexpr int kSampleKind = 1, kAnswerKind = 2;
 constexpr hal::Duration kLinkPause = std::chrono::milliseconds(100);
 
@@ -32,7 +33,8 @@ Vn100Unit::Vn100Unit(const Vn100UnitConfig& config, World& world, hal::Clock& cl
       clock_(clock),
       faults_(faults),
       uart_(end, config.baud),
-      out_(uart_, clock, faults) {
+      out_(uart_, clock, faults),
+      noise_(world.config().seed, kNoiseSource) {
   restart();
   started_at_ = hal::Time() - config.running_since_before;
 }
@@ -125,7 +127,8 @@ hal::Task<void> Vn100Unit::stream() {
     const bool speaks = value_of(75, 0) != 0 || value_of(6, 0) == 14;
     if (paused_ || !speaks || faults_.silent()) continue;
     const drivers::Bytes message = measure();
-    if (!co_await out_.write(message, kSampleKind)) co_await clock_.sleep_for(kLinkPause);
+    const auto sent = co_await out_.write(message, kSampleKind);
+    if (!sent) co_await clock_.sleep_for(kLinkPause);
   }
 }
 
@@ -139,8 +142,14 @@ drivers::Bytes Vn100Unit::measure() {
   sample.startup_ns = static_cast<std::uint64_t>(
       std::llround(static_cast<double>(age.count()) * (1 + config_.clock_skew)));
   sample.yaw_pitch_roll_deg = {static_cast<float>(std::remainder(90 - heading_deg, 360)), 0, 0};
-  sample.rate_radps = {0, 0, static_cast<float>(-truth.yaw_rate_radps) * factor};
-  sample.accel_mps2 = {0, 0, static_cast<float>(-kGravity_mps2) * factor};
+  const auto noisy = [&](double value, double sigma) {
+    return static_cast<float>(value + noise_.normal(sigma)) * factor;
+  };
+  const double gyro_sigma_radps = world_.config().gyro_sigma_radps;
+  sample.rate_radps = {noisy(0, gyro_sigma_radps), noisy(0, gyro_sigma_radps),
+                       static_cast<float>(-truth.yaw_rate_radps) * factor};
+  sample.accel_mps2 = {noisy(0, kAccelSigma_mps2), noisy(0, kAccelSigma_mps2),
+                       noisy(-kGravity_mps2, kAccelSigma_mps2)};
   sample.magnetic_gauss = {0.2F, 0, 0.4F};
   sample.vpe_status = config_.vpe_status;
   if (value_of(75, 0) == 0) return drivers::encode_vn100_line(sample);

@@ -55,6 +55,7 @@ class Vn100Unit {
   UnitFaults& faults_;
   Uart uart_;
   FaultyStream out_;
+  NoiseStream noise_;                     // Of what the world does not tell.
   std::map<int, std::string> registers_;  // As they are read: "800" or "1,16,01,0029".
   bool paused_ = false;
   hal::Time started_at_{};
