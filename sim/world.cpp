@@ -220,6 +220,11 @@ bool World::free_ahead(double forward_mps) const {
   return clear_m >= config_.radius_m && !ground_breaks_off(ahead);
 }
 
+hal::Twist World::rolling() const {
+  return {(left_.speed_mps + right_.speed_mps) / 2,
+          (right_.speed_mps - left_.speed_mps) / config_.track_m};
+}
+
 hal::WheelTravel World::take_travel() {
   const auto take = [this](Side& side) {
     const double ticks =

@@ -97,6 +97,7 @@ class World {
   const Scene& scene() const { return scene_; }
   const StandingPose& robot() const { return robot_; }  // The truth.
   bool moving() const { return left_.speed_mps != 0 || right_.speed_mps != 0; }
+  hal::Twist rolling() const;  // As the wheels turn now, slip left out.
   int collisions() const { return collisions_; }
   double driven_m() const { return driven_m_; }  // Of the body's centre.
 
