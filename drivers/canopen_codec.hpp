@@ -117,6 +117,9 @@ std::string_view name(SdoKind kind);
 Fault abort_fault(std::uint32_t code);
 // About an EMCY (or 0x603F) error code: the exact code if known, else its class.
 Fault emergency_fault(std::uint16_t code);
+// The tables' own entries behind these two: their value is that of the class, not the code.
+const Fault& abort_entry(std::uint32_t code);
+const Fault& emergency_entry(std::uint16_t code);
 // Of the bits of object 0x1001, all eight.
 std::span<const Fault> error_register_faults();
 

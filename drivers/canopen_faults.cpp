@@ -103,20 +103,31 @@ constexpr Fault kErrorRegister[] = {
     {0x80, "manufacturer", "what the maker watches", "see the drive's manual"},
 };
 
+constexpr Fault kUnknownAbort{0, "unknown abort code", "not in CiA 301: the maker's own",
+                              "see the drive's manual"};
+
 }  // namespace
 
+const Fault& abort_entry(std::uint32_t code) {
+  const Fault* found = fault_of(kAborts, code);
+  return found != nullptr ? *found : kUnknownAbort;
+}
+
+const Fault& emergency_entry(std::uint16_t code) {
+  return std::find_if(
+             std::begin(kEmergencies), std::end(kEmergencies),
+             [&](const Class& known) { return (code & known.mask) == known.fault.value; })
+      ->fault;
+}
+
 Fault abort_fault(std::uint32_t code) {
-  const auto* found = std::find_if(std::begin(kAborts), std::end(kAborts),
-                                   [&](const Fault& fault) { return fault.value == code; });
-  if (found != std::end(kAborts)) return *found;
-  return {code, "unknown abort code", "not in CiA 301: the maker's own", "see the drive's manual"};
+  Fault fault = abort_entry(code);
+  fault.value = code;
+  return fault;
 }
 
 Fault emergency_fault(std::uint16_t code) {
-  const auto* found =
-      std::find_if(std::begin(kEmergencies), std::end(kEmergencies),
-                   [&](const Class& known) { return (code & known.mask) == known.fault.value; });
-  Fault fault = found->fault;
+  Fault fault = emergency_entry(code);
   fault.value = code;
   return fault;
 }
