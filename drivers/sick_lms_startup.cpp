@@ -84,6 +84,49 @@ void configure(Dialogue& talk, const LmsSettings& s) {
   if (s.lms5xx) talk.ask("first echo only", "sWN", "FREchoFilter", {{As::u8, 0}});
 }
 
+constexpr std::int32_t kAngleTolerance_1e4deg = 10;  // An LMS111 says -449997 for -450000.
+
+std::string differs(std::string_view what, std::int64_t is, std::int64_t wanted,
+                    std::int64_t tolerance) {
+  if (std::abs(is - wanted) <= tolerance) return "";
+  return std::string(what) + " is " + std::to_string(is) + ", not " + std::to_string(wanted);
+}
+
+std::string scan_problem(const LmsSettings& s, ColaReader in) {
+  const std::int64_t frequency = in.u32();
+  in.i16();
+  const std::int64_t resolution = in.u32();
+  if (!in.ok()) return "";  // Firmware that says the frequency only.
+  const auto problem = differs("frequency (0.01 Hz)", frequency, s.frequency_centihz, 0);
+  return problem.empty() ? differs("resolution (1e-4 deg)", resolution, s.resolution_1e4deg, 1)
+                         : problem;
+}
+
+std::string sector_problem(const LmsSettings& s, ColaReader in) {
+  in.u16();
+  const std::int64_t resolution = in.u32(), start = in.i32(), stop = in.i32();
+  if (!in.ok()) return "the sector cannot be read";
+  auto problem = differs("resolution (1e-4 deg)", resolution, s.resolution_1e4deg, 1);
+  if (problem.empty())
+    problem = differs("sector start (1e-4 deg)", start, s.start_1e4deg, kAngleTolerance_1e4deg);
+  if (problem.empty())
+    problem = differs("sector stop (1e-4 deg)", stop, s.stop_1e4deg, kAngleTolerance_1e4deg);
+  return problem;
+}
+
+std::string data_problem(const LmsSettings& s, ColaReader in) {
+  const std::int64_t channels = in.u8();
+  in.u8();
+  const std::int64_t remission = in.u8();
+  for (int i = 0; i < 8; ++i) in.u8();
+  const std::int64_t every = in.u16();
+  if (!in.ok()) return "the data settings cannot be read";
+  auto problem = differs("data channels", channels, 1, 0);
+  if (problem.empty()) problem = differs("remission", remission, s.remission, 0);
+  if (problem.empty()) problem = differs("every n-th scan", every, s.every_nth_scan, 0);
+  return problem;
+}
+
 }  // namespace
 
 std::string lms_settings_problem(const LmsSettings& s) {
@@ -129,6 +172,39 @@ std::vector<LmsStep> lms_stop(ColaDialect dialect) {
   talk.ask("unsubscribe", "sEN", "LMDscandata", {{As::u8, 0}});
   talk.expect(0);
   return std::move(talk.steps);
+}
+
+LmsStep lms_hello(ColaDialect dialect) {
+  Dialogue talk(dialect);
+  talk.ask("say that it is there", "sRN", "SCdevicestate").timeout_s = 1;
+  return std::move(talk.steps.front());
+}
+
+LmsStep lms_model(ColaDialect dialect) {
+  Dialogue talk(dialect);
+  talk.ask("say its model", "sRN", "DeviceIdent").may_fail = true;
+  return std::move(talk.steps.front());
+}
+
+std::vector<LmsStep> lms_read_back(ColaDialect dialect) {
+  Dialogue talk(dialect);
+  for (const auto name : {"LMPscancfg", "LMPoutputRange", "LMDscandatacfg"})
+    talk.ask("say its settings", "sRN", name).may_fail = true;
+  return std::move(talk.steps);
+}
+
+std::string lms_read_back_problem(const LmsSettings& settings, const ColaMessage& message) {
+  if (message.name == "LMPscancfg") return scan_problem(settings, ColaReader(message));
+  if (message.name == "LMPoutputRange") return sector_problem(settings, ColaReader(message));
+  if (message.name == "LMDscandatacfg") return data_problem(settings, ColaReader(message));
+  return "";
+}
+
+std::string lms_text(const ColaMessage& message) {
+  ColaReader in(message);
+  const std::size_t size = in.u16();
+  std::string text(in.characters(size));
+  return in.ok() ? text : "";
 }
 
 LmsAnswer lms_judge(const LmsStep& step, const ColaMessage& message) {

@@ -35,6 +35,17 @@ struct LmsStep {
 
 std::vector<LmsStep> lms_startup(ColaDialect dialect, const LmsSettings& settings);
 std::vector<LmsStep> lms_stop(ColaDialect dialect);
+// Asked of anything that may be a scanner of this dialect.
+LmsStep lms_hello(ColaDialect dialect);
+// The model's name; old firmware refuses to say.
+LmsStep lms_model(ColaDialect dialect);
+// What the settings are now. Firmware that cannot tell some of them refuses.
+std::vector<LmsStep> lms_read_back(ColaDialect dialect);
+// Empty, or which setting differs, of an answer to lms_read_back().
+std::string lms_read_back_problem(const LmsSettings& settings, const ColaMessage& message);
+// The text of an answer that is one, as FirmwareVersion's and LocationName's; of DeviceIdent the
+// first.
+std::string lms_text(const ColaMessage& message);
 
 enum class LmsAnswer { accepted, refused, unrelated };
 // Answers are matched by name: events and late answers may come between.

@@ -7,8 +7,8 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "sim/noise.hpp"
 #include "sim/parallel.hpp"
+#include "sim/range_noise.hpp"
 
 namespace sim {
 namespace {
@@ -47,9 +47,7 @@ class ScanCaster {
         key_(key),
         azimuths_(sines(pattern.azimuth_first_rad, pattern.azimuth_step_rad, pattern.columns)),
         elevations_(sines(pattern.elevation_first_rad, pattern.elevation_step_rad, pattern.rows)),
-        lossless_cosine_(model.lost_share_max > 0
-                             ? static_cast<float>(std::cos(model.grazing_start_rad))
-                             : 0.0f) {
+        noise_(model) {
     rtcInitIntersectContext(&context_);
     context_.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   }
@@ -102,27 +100,10 @@ class ScanCaster {
     }
   }
 
-  // What the scanner reports for a beam that hit something.
   float returned_m(const RTCRayHit16& rays, std::uint32_t i, std::size_t beam) const {
-    const std::uint64_t bits = mix(key_ + beam);
-    if (is_lost(rays, i, static_cast<std::uint32_t>(bits))) return 0;
-    const double range_m = rays.ray.tfar[i];
-    if (range_m < model_.range_min_m) return 0;
-    if (model_.range_sigma_m == 0) return static_cast<float>(range_m);
-    const double uniform = (static_cast<double>(bits >> 32) + 0.5) * 0x1p-32;
-    const double noisy_m = range_m + model_.range_sigma_m * normal_quantile(uniform);
-    const bool in_range = noisy_m >= model_.range_min_m && noisy_m <= model_.range_max_m;
-    return in_range ? static_cast<float>(noisy_m) : 0;
-  }
-
-  bool is_lost(const RTCRayHit16& rays, std::uint32_t i, std::uint32_t bits) const {
     const Eigen::Vector3f normal(rays.hit.Ng_x[i], rays.hit.Ng_y[i], rays.hit.Ng_z[i]);
     const Eigen::Vector3f direction(rays.ray.dir_x[i], rays.ray.dir_y[i], rays.ray.dir_z[i]);
-    const float along = std::abs(normal.dot(direction));
-    const float length2 = normal.squaredNorm() * direction.squaredNorm();
-    if (along * along >= lossless_cosine_ * lossless_cosine_ * length2) return false;
-    const double incidence_rad = std::acos(static_cast<double>(along / std::sqrt(length2)));
-    return bits * 0x1p-32 < lost_share(model_, incidence_rad);
+    return noise_.reported_m(rays.ray.tfar[i], normal, direction, mix(key_ + beam));
   }
 
   const Scene& scene_;
@@ -132,7 +113,7 @@ class ScanCaster {
   const ScannerModel model_;
   const std::uint64_t key_;
   const std::vector<SinCos> azimuths_, elevations_;
-  const float lossless_cosine_;
+  const RangeNoise noise_;
   RTCIntersectContext context_;
 };
 

@@ -1,0 +1,438 @@
+#include "drivers/sick_lms.hpp"
+
+#include <array>
+#include <boost/asio/experimental/awaitable_operators.hpp>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace drivers {
+namespace {
+
+using namespace std::chrono_literals;
+using namespace boost::asio::experimental::awaitable_operators;
+using boost::system::errc::make_error_code;
+
+constexpr Fault kImpossible{0, "impossible settings",
+                            "the robot file asks for what no such model has",
+                            "correct the scanner's settings in the robot file"};
+constexpr Fault kUnplugged{1, "no connection", "the cable, the network or the scanner's power",
+                           "check power, cable and address; it comes back by itself"};
+constexpr Fault kSilent{
+    2, "no answer", "no power, still starting (up to 90 s), a cable, or a wrong address or speed",
+    "check power and cable; CoLa answers on TCP port 2111 or 2112, or on a "
+    "serial line at 57600 baud"};
+constexpr Fault kGarbage{3, "not CoLa", "another device, or a serial line at the wrong speed",
+                         "check what is connected there; set the serial line to 57600 baud"};
+constexpr Fault kOtherModel{4, "wrong model", "another scanner than the robot file says",
+                            "connect the right one, or name this one in the robot file"};
+constexpr Fault kRefused{5, "setting refused", "the scanner does not accept a setting",
+                         "see the detail; compare the settings with the model's"};
+constexpr Fault kReadBack{6, "settings differ", "the scanner is not set as it was told to be",
+                          "let no other program set it; if it stays, restart the scanner"};
+constexpr Fault kQuiet{7, "scans stopped", "the connection or the scanner hangs",
+                       "it is restarted by itself; if it stays, switch its power off and on"};
+constexpr Fault kStuck{8, "same scan again and again", "the scanner's measurement hangs",
+                       "switch its power off and on"};
+constexpr Fault kSlow{9, "scans too slow", "the mirror does not reach its speed",
+                      "wait for the spin-up; if it stays, replace the scanner"};
+constexpr Fault kLosing{10, "scans get lost", "the connection or this computer is too slow",
+                        "check cable and network load"};
+constexpr Fault kLate{11, "scans come late", "something between scanner and computer holds them up",
+                      "connect directly; take other traffic off the line"};
+constexpr Fault kDamaged{12, "damaged telegrams", "bytes change or go missing on the way",
+                         "check the cable and its shield"};
+
+constexpr hal::Duration kStartTimeout = 10s;
+constexpr hal::Duration kProfileTimeout = 2s;
+constexpr hal::Duration kAliveEvery = 10s;
+constexpr hal::Duration kForgetClock = 60s;  // Without scans the wraps cannot be told any more.
+constexpr int kInARow = 10;
+constexpr int kCleanAgain = 100;
+constexpr std::uint32_t kJustStarted = 0x0100;
+constexpr double kLate_s = 0.1;
+constexpr double kLosingShare = 0.01;
+
+std::uint64_t bytes_skipped(const Resync& resync) {
+  std::uint64_t bytes = 0;
+  for (const auto& [why, skipped] : resync.skipped()) bytes += skipped.bytes;
+  return bytes;
+}
+
+std::string ms(double span_s) {
+  return std::to_string(std::lround(span_s * 1000)) + " ms";
+}
+
+}  // namespace
+
+SickLms::SickLms(SickLmsConfig config, hal::Clock& clock, hal::ByteStream& stream)
+    : config_(config), clock_(clock), stream_(stream) {}
+
+SickLms::~SickLms() = default;
+
+std::string_view SickLms::model() const {
+  return config_.settings.lms5xx ? "sick-lms5xx" : "sick-lms1xx";
+}
+
+SickLms::Counts SickLms::counts() const {
+  return counts_;
+}
+
+double SickLms::period_s() const {
+  return 100.0 * config_.settings.every_nth_scan / config_.settings.frequency_centihz;
+}
+
+hal::Task<void> SickLms::run() {
+  if (const auto problem = lms_settings_problem(config_.settings); !problem.empty()) {
+    troubles_.set(kImpossible, problem);
+    for (;;) co_await clock_.sleep_for(kAliveEvery);
+  }
+  for (;;) {
+    ++counts_.sessions;
+    state_ = DeviceState::starting;
+    co_await session();
+    state_ = DeviceState::lost;
+    interrupted_ = interrupted_ || streaming_;
+    streaming_ = false;
+    switched_.notify();
+    co_await clock_.sleep_for(hal::from_seconds(config_.retry_s));
+  }
+}
+
+// Ends when the scanner is lost; the trouble says why.
+hal::Task<void> SickLms::session() {
+  asked_ = nullptr;
+  streaming_ = set_up_lost_ = false;
+  bytes_ = damaged_ = 0;
+  resync_ = Resync(kColaFrameMax);
+  co_await (receive() || converse());
+}
+
+hal::Task<void> SickLms::receive() {
+  std::array<std::uint8_t, 16384> buffer;
+  for (;;) {
+    const auto got = co_await stream_.read_some(buffer);
+    if (!got) {
+      troubles_.set(kUnplugged, got.error().message());
+      co_return;
+    }
+    troubles_.clear(kUnplugged);
+    const hal::Time arrival = clock_.now();
+    bytes_ += *got;
+    resync_.feed(ByteView(buffer).first(*got));
+    while (const auto frame = resync_.next(look_cola)) take(*frame, arrival);
+  }
+}
+
+hal::Task<void> SickLms::converse() {
+  if (!co_await find_dialect() || !co_await identify() || !co_await set_up()) co_return;
+  for (const Fault* fault : {&kSilent, &kGarbage, &kOtherModel, &kRefused, &kReadBack, &kQuiet})
+    troubles_.clear(*fault);
+  state_ = DeviceState::running;
+  co_await serve();
+}
+
+// The last dialect first.
+hal::Task<bool> SickLms::find_dialect() {
+  for (int attempt = 0; attempt < 2; ++attempt) {
+    if (const auto answer = co_await ask(lms_hello(dialect_))) {
+      dialect_ = answer->message().dialect;
+      co_return true;
+    }
+    dialect_ = dialect_ == ColaDialect::binary ? ColaDialect::ascii : ColaDialect::binary;
+  }
+  if (troubles_.has(kUnplugged)) co_return false;
+  const bool garbage = bytes_skipped(resync_) > 0;
+  troubles_.clear(garbage ? kSilent : kGarbage);
+  troubles_.set(garbage ? kGarbage : kSilent,
+                garbage ? std::to_string(bytes_) + " bytes came, none of them an answer"
+                        : "to the question for its state, in CoLa B and in CoLa A");
+  co_return false;
+}
+
+hal::Task<bool> SickLms::identify() {
+  identity_ = {};
+  identity_.maker = "SICK";
+  const auto model = co_await ask(lms_model(dialect_));
+  if (model && model->accepted) identity_.model = lms_text(model->message());
+  const std::string_view family = config_.settings.lms5xx ? "LMS5" : "LMS1";
+  if (identity_.model.empty() || identity_.model.starts_with(family)) co_return true;
+  troubles_.set(kOtherModel,
+                "it says it is a " + identity_.model + ", not of " + std::string(family) + "xx");
+  co_return false;
+}
+
+hal::Task<bool> SickLms::set_up() {
+  for (const LmsStep& step : lms_startup(dialect_, config_.settings)) {
+    if (step.command == "sEA") continue;  // Scans come between start() and stop() only.
+    if (!step.may_fail) {
+      if (!co_await insist(step)) co_return false;
+      continue;
+    }
+    const auto answer = co_await ask(step);
+    if (answer && answer->accepted && step.name == "FirmwareVersion")
+      identity_.firmware = lms_text(answer->message());
+  }
+  co_return co_await read_back();
+}
+
+hal::Task<bool> SickLms::read_back() {
+  for (const LmsStep& step : lms_read_back(dialect_)) {
+    const auto answer = co_await ask(step);
+    if (!answer || !answer->accepted) continue;  // The scans themselves will tell.
+    const auto problem = lms_read_back_problem(config_.settings, answer->message());
+    if (problem.empty()) continue;
+    troubles_.set(kReadBack, problem);
+    co_return false;
+  }
+  co_return true;
+}
+
+// An accepted answer, or a trouble.
+hal::Task<bool> SickLms::insist(const LmsStep& step) {
+  const auto answer = co_await ask(step);
+  if (answer && answer->accepted) co_return true;
+  if (answer)
+    troubles_.set(kRefused, answer->refusal);
+  else if (!troubles_.has(kUnplugged))
+    troubles_.set(kSilent, "when asked to " + std::string(step.purpose));
+  co_return false;
+}
+
+hal::Task<std::optional<SickLms::Answer>> SickLms::ask(const LmsStep& step) {
+  const hal::Time deadline = clock_.now() + hal::from_seconds(step.timeout_s);
+  asked_ = &step;
+  answer_.reset();
+  const auto written = co_await (stream_.write(step.request) || clock_.sleep_until(deadline));
+  if (const auto* result = std::get_if<0>(&written)) {
+    if (*result)
+      troubles_.clear(kUnplugged);
+    else
+      troubles_.set(kUnplugged, result->error().message());
+  }
+  while (!answer_ && co_await answered_.wait_until(clock_, deadline)) {
+  }
+  asked_ = nullptr;
+  co_return std::exchange(answer_, std::nullopt);
+}
+
+// Until the scanner is lost.
+hal::Task<void> SickLms::serve() {
+  for (;;) {
+    if (wanted_ != streaming_) {
+      if (!co_await subscribe(wanted_)) co_return;
+    } else if (!streaming_) {
+      const bool changed = co_await changed_.wait_until(clock_, clock_.now() + kAliveEvery);
+      if (!changed && !co_await insist(lms_hello(dialect_))) co_return;
+    } else {
+      const hal::Duration quiet = hal::from_seconds(3 * period_s()) + 100ms;
+      co_await changed_.wait_until(clock_, clock_.now() + quiet);
+      if (set_up_lost_) co_return;
+      const hal::Duration silence = clock_.now() - last_scan_;
+      if (wanted_ && silence > quiet) {
+        troubles_.set(kQuiet, "none for " + ms(hal::seconds(silence)));
+        if (silence > 2s || !co_await subscribe(true)) co_return;
+      }
+    }
+  }
+}
+
+hal::Task<bool> SickLms::subscribe(bool on) {
+  const bool again = on && streaming_;
+  if (!again && clock_.now() - last_scan_ > kForgetClock) forget_clock();
+  if (!again && !interrupted_) {  // What was not asked for is not lost.
+    sequence_ = LmsSequence();
+    last_start_us_.reset();
+    profiles_.clear();
+  }
+  if (!again) last_scan_ = clock_.now();
+  const auto steps = on ? lms_startup(dialect_, config_.settings) : lms_stop(dialect_);
+  if (!co_await insist(steps.back())) co_return false;
+  streaming_ = on;
+  interrupted_ = false;
+  switched_.notify();
+  co_return true;
+}
+
+void SickLms::forget_clock() {
+  fit_ = ClockFit();
+  unwrap_us_ = Unwrap();
+  last_start_us_.reset();
+}
+
+hal::Task<hal::Result<void>> SickLms::start() {
+  wanted_ = true;
+  changed_.notify();
+  const hal::Time deadline = clock_.now() + kStartTimeout;
+  while (!streaming_)
+    if (!co_await switched_.wait_until(clock_, deadline))
+      co_return make_error_code(boost::system::errc::timed_out);
+  co_return hal::Result<void>{};
+}
+
+hal::Task<hal::Result<void>> SickLms::stop() {
+  wanted_ = interrupted_ = false;
+  changed_.notify();
+  const hal::Time deadline = clock_.now() + kStartTimeout;
+  while (streaming_)
+    if (!co_await switched_.wait_until(clock_, deadline))
+      co_return make_error_code(boost::system::errc::timed_out);
+  co_return hal::Result<void>{};
+}
+
+hal::Task<hal::Result<hal::Profile>> SickLms::next_profile() {
+  if (!wanted_) co_return make_error_code(boost::system::errc::operation_not_permitted);
+  const hal::Time deadline = clock_.now() + kProfileTimeout;
+  while (profiles_.empty())
+    if (!co_await arrived_.wait_until(clock_, deadline))
+      co_return make_error_code(boost::system::errc::timed_out);
+  hal::Profile profile = std::move(profiles_.front());
+  profiles_.pop_front();
+  co_return profile;
+}
+
+void SickLms::take(ByteView frame, hal::Time arrival) {
+  const auto message = parse_cola(frame);
+  if (!message) return;
+  if (message->name == "LMDscandata" && message->command == "sSN") {
+    if (streaming_ || wanted_) take_scan(*message, arrival);
+    return;
+  }
+  if (asked_ == nullptr || answer_) return;
+  const LmsAnswer verdict = lms_judge(*asked_, *message);
+  if (verdict == LmsAnswer::unrelated) return;
+  const bool accepted = verdict == LmsAnswer::accepted;
+  answer_ = Answer{accepted,
+                   {frame.begin(), frame.end()},
+                   accepted ? std::string() : lms_refusal(*asked_, *message)};
+  answered_.notify();
+}
+
+void SickLms::take_scan(const ColaMessage& message, hal::Time arrival) {
+  if (const auto why = decode_lms_scan(message, scan_); !why.empty()) {
+    ++counts_.unreadable;
+    clean_ = 0;
+    troubles_.set(kDamaged, std::string(why));
+    return;
+  }
+  const LmsChannel* const channel = scan_.distances();
+  if (channel == nullptr || !as_set_up(*channel)) {
+    troubles_.set(kReadBack, "the scans are not as they were asked for");
+    set_up_lost_ = true;
+    changed_.notify();
+    return;
+  }
+  const std::uint64_t lost_before = sequence_.lost();
+  const std::optional<std::uint32_t> previous_us = last_start_us_;
+  if (!is_new(arrival)) return;
+  const std::uint64_t lost = sequence_.lost() - lost_before;
+  const auto step_us = previous_us ? scan_.scan_start_us - *previous_us : 0U;
+  counts_.lost += lost;
+  lost_share_ += (static_cast<double>(lost) / static_cast<double>(lost + 1) - lost_share_) / 100;
+  judge_scan(lost > 0 ? 0 : step_us / 1e6);
+  const std::int64_t sent_us = unwrap_us_(scan_.transmit_us);
+  fit_.add(sent_us * 1000, arrival);
+  jitter_s_ = std::max(jitter_s_ * 0.98, fit_.last_excess_s());
+  const std::uint32_t before_sending_us = scan_.transmit_us - scan_.scan_start_us;
+  add_profile(*channel, *fit_.to_ours((sent_us - before_sending_us) * 1000), lost);
+}
+
+// Neither a repetition nor older than one that was taken.
+bool SickLms::is_new(hal::Time arrival) {
+  const auto later_us = static_cast<std::int32_t>(scan_.scan_start_us - last_start_us_.value_or(0));
+  if (last_start_us_ && later_us < 0 && later_us > -1'000'000) {
+    ++counts_.out_of_order;
+    return false;
+  }
+  const auto seen = sequence_.see(scan_);
+  if (seen == LmsSequence::Seen::repeated) {
+    ++counts_.repeated;
+    if (++stuck_ == kInARow)
+      troubles_.set(kStuck, "scan " + std::to_string(scan_.scan_counter) + " came " +
+                                std::to_string(stuck_ + 1) + " times");
+    return false;
+  }
+  if (seen == LmsSequence::Seen::restarted) forget_clock();
+  stuck_ = 0;
+  troubles_.clear(kStuck);
+  troubles_.clear(kQuiet);
+  last_start_us_ = scan_.scan_start_us;
+  last_scan_ = arrival;
+  return true;
+}
+
+// `step_s` from the start of the scan before, 0 where that is not known.
+void SickLms::judge_scan(double step_s) {
+  const auto in_a_row = [&](bool bad, int& count, const Fault& fault, auto detail) {
+    count = bad ? count + 1 : 0;
+    if (count == kInARow) troubles_.set(fault, detail());
+    if (count == 0) troubles_.clear(fault);
+  };
+  if (step_s > 0)
+    in_a_row(step_s > 1.2 * period_s(), slow_, kSlow,
+             [&] { return "one every " + ms(step_s) + " instead of " + ms(period_s()); });
+  in_a_row(fit_.last_excess_s() > kLate_s, late_, kLate,
+           [&] { return "by " + ms(fit_.last_excess_s()); });
+  if (lost_share_ > kLosingShare)
+    troubles_.set(kLosing, std::to_string(std::lround(lost_share_ * 1000)) + " of 1000");
+  else if (lost_share_ < kLosingShare / 2)
+    troubles_.clear(kLosing);
+  judge_damage();
+  judge_status();
+}
+
+void SickLms::judge_damage() {
+  const std::uint64_t damaged = bytes_skipped(resync_);
+  clean_ = damaged == damaged_ ? clean_ + 1 : 0;
+  damaged_ = damaged;
+  if (clean_ == 0) troubles_.set(kDamaged, std::to_string(damaged) + " bytes of no telegram");
+  if (clean_ == kCleanAgain) troubles_.clear(kDamaged);
+}
+
+void SickLms::judge_status() {
+  if (scan_.status == status_) return;
+  status_ = scan_.status;
+  for (const Fault* fault : status_faults_) troubles_.clear(*fault);
+  status_faults_ = lms_faults(scan_);
+  std::erase_if(status_faults_, [](const Fault* fault) { return fault->value == kJustStarted; });
+  for (const Fault* fault : status_faults_) troubles_.set(*fault, "as its status says");
+}
+
+bool SickLms::as_set_up(const LmsChannel& channel) const {
+  const LmsSettings& s = config_.settings;
+  const auto beams = (s.stop_1e4deg - s.start_1e4deg) / s.resolution_1e4deg + 1;
+  return scan_.scan_frequency_centihz == static_cast<std::uint32_t>(s.frequency_centihz) &&
+         std::abs(channel.step_1e4deg - s.resolution_1e4deg) <= 1 &&
+         std::abs(channel.start_1e4deg - s.start_1e4deg) <= 10 &&
+         std::abs(static_cast<std::int32_t>(channel.raw.size()) - beams) <= 1;
+}
+
+void SickLms::add_profile(const LmsChannel& channel, hal::Time stamp, std::uint64_t lost) {
+  hal::Profile profile;
+  profile.stamp = stamp;
+  profile.beam_period_s = beam_delay_s(scan_, channel, 1);
+  profile.angle_first_rad = beam_angle_rad(channel, 0);
+  profile.angle_step_rad = beam_angle_rad(channel, 1) - profile.angle_first_rad;
+  profile.ranges_m.reserve(channel.raw.size());
+  for (const std::uint16_t raw : channel.raw) {
+    const LmsRaw meaning = lms_raw_meaning(raw, config_.settings.lms5xx);
+    profile.ranges_m.push_back(
+        meaning == LmsRaw::range     ? static_cast<float>(lms_range_m(channel, raw))
+        : meaning == LmsRaw::nothing ? 0.0F
+                                     : std::numeric_limits<float>::quiet_NaN());
+  }
+  for (const auto& rssi : scan_.channels16)
+    if (rssi.label() == "RSSI1") profile.intensities.assign(rssi.raw.begin(), rssi.raw.end());
+  if (profiles_.size() >= config_.profiles_max) {
+    const std::uint64_t lost_with_it = 1 + profiles_.front().lost_before;
+    profiles_.pop_front();
+    profiles_.front().lost_before += lost_with_it;
+    ++counts_.lost;
+  }
+  profile.lost_before = lost;
+  profiles_.push_back(std::move(profile));
+  ++counts_.profiles;
+  arrived_.notify();
+}
+
+}  // namespace drivers

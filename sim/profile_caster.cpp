@@ -1,0 +1,122 @@
+#include "sim/profile_caster.hpp"
+
+#include <embree3/rtcore.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "sim/parallel.hpp"
+#include "sim/range_noise.hpp"
+
+namespace sim {
+namespace {
+
+constexpr std::uint32_t kTile = 4;  // Packets of 4 neighbouring beams of 4 turns after each other.
+constexpr std::uint32_t kPacket = kTile * kTile;
+
+}  // namespace
+
+struct ProfileCaster::Impl {
+  const Scene& scene;
+  const ScannerModel model;
+  const RangeNoise noise;
+  const std::uint64_t seed;
+  Eigen::Vector3d P_origin_m;
+  std::vector<Eigen::Vector3d> P_directions;
+
+  // Up to kTile turns from `first`.
+  struct Strip {
+    const Impl& of;
+    const Eigen::Isometry3d T_W_S;
+    std::span<const MirrorTurn> turns;
+    std::uint64_t keys[kTile];
+
+    void aim(std::uint32_t beam, RTCRayHit16& rays, int* valid) const;
+    void cast(float* ranges_m) const;
+  };
+};
+
+ProfileCaster::ProfileCaster(const Scene& scene, const ScannerModel& model, const MirrorArc& arc,
+                             const Eigen::Isometry3d& T_P_L, std::uint64_t seed) {
+  std::vector<Eigen::Vector3d> directions;
+  for (std::uint32_t i = 0; i < arc.beams; ++i) {
+    const double angle = arc.angle_first_rad + i * arc.angle_step_rad;
+    directions.emplace_back(T_P_L.linear() * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0));
+  }
+  impl_ = std::make_unique<Impl>(
+      Impl{scene, model, RangeNoise(model), seed, T_P_L.translation(), std::move(directions)});
+}
+
+ProfileCaster::~ProfileCaster() = default;
+
+void ProfileCaster::Impl::Strip::aim(std::uint32_t beam, RTCRayHit16& rays, int* valid) const {
+  const auto beams = static_cast<std::uint32_t>(of.P_directions.size());
+  for (std::uint32_t i = 0; i < kPacket; ++i) {
+    const std::uint32_t turn =
+        std::min<std::uint32_t>(i / kTile, static_cast<std::uint32_t>(turns.size()) - 1);
+    const std::uint32_t b = std::min(beam + i % kTile, beams - 1);
+    valid[i] = i / kTile < turns.size() && beam + i % kTile < beams ? -1 : 0;
+    const double pan = turns[turn].pan_first_rad +
+                       (turns[turn].pan_end_rad - turns[turn].pan_first_rad) * b / beams;
+    const double c = std::cos(pan), s = std::sin(pan);
+    const auto turned = [&](const Eigen::Vector3d& p) {
+      return Eigen::Vector3d(c * p.x() - s * p.y(), s * p.x() + c * p.y(), p.z());
+    };
+    const Eigen::Vector3f direction = (T_W_S.linear() * turned(of.P_directions[b])).cast<float>();
+    const Eigen::Vector3f origin =
+        (T_W_S * turned(of.P_origin_m) - of.scene.origin_m()).cast<float>();
+    rays.ray.org_x[i] = origin.x();
+    rays.ray.org_y[i] = origin.y();
+    rays.ray.org_z[i] = origin.z();
+    rays.ray.dir_x[i] = direction.x();
+    rays.ray.dir_y[i] = direction.y();
+    rays.ray.dir_z[i] = direction.z();
+    rays.ray.tnear[i] = 0;
+    rays.ray.tfar[i] = static_cast<float>(of.model.range_max_m);
+    rays.ray.time[i] = 0;
+    rays.ray.mask[i] = ~0u;
+    rays.ray.id[i] = rays.ray.flags[i] = 0;
+    rays.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+  }
+}
+
+void ProfileCaster::Impl::Strip::cast(float* ranges_m) const {
+  const auto beams = static_cast<std::uint32_t>(of.P_directions.size());
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  for (std::uint32_t beam = 0; beam < beams; beam += kTile) {
+    RTCRayHit16 rays;
+    int valid[kPacket];
+    aim(beam, rays, valid);
+    rtcIntersect16(valid, of.scene.embree(), &context, &rays);
+    for (std::uint32_t i = 0; i < kPacket; ++i) {
+      if (!valid[i]) continue;
+      const Eigen::Vector3f normal(rays.hit.Ng_x[i], rays.hit.Ng_y[i], rays.hit.Ng_z[i]);
+      const Eigen::Vector3f direction(rays.ray.dir_x[i], rays.ray.dir_y[i], rays.ray.dir_z[i]);
+      const std::uint32_t b = beam + i % kTile;
+      ranges_m[std::size_t{i / kTile} * beams + b] =
+          rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID
+              ? 0.0F
+              : of.noise.reported_m(rays.ray.tfar[i], normal, direction, mix(keys[i / kTile] + b));
+    }
+  }
+}
+
+void ProfileCaster::cast(const Eigen::Isometry3d& T_W_S, std::span<const MirrorTurn> turns,
+                         int threads, std::span<float> ranges_m) const {
+  const std::size_t beams = impl_->P_directions.size();
+  for_each_chunk((turns.size() + kTile - 1) / kTile, threads, [&](std::size_t strip) {
+    const std::size_t first = strip * kTile;
+    Impl::Strip one{*impl_,
+                    T_W_S,
+                    turns.subspan(first, std::min<std::size_t>(kTile, turns.size() - first)),
+                    {}};
+    for (std::size_t i = 0; i < one.turns.size(); ++i)
+      one.keys[i] = mix(mix(impl_->seed) ^ one.turns[i].number);
+    one.cast(&ranges_m[first * beams]);
+  });
+}
+
+}  // namespace sim
