@@ -43,6 +43,10 @@ constexpr Fault kLate{11, "scans come late", "something between scanner and comp
 constexpr Fault kDamaged{12, "damaged telegrams", "bytes change or go missing on the way",
                          "check the cable and its shield"};
 
+constexpr Fault kDisorder{13, "scans out of order",
+                          "something on the way holds some telegrams back",
+                          "connect directly, over TCP"};
+
 constexpr hal::Duration kStartTimeout = 10s;
 constexpr hal::Duration kProfileTimeout = 2s;
 constexpr hal::Duration kAliveEvery = 10s;
@@ -239,7 +243,7 @@ hal::Task<void> SickLms::serve() {
 
 hal::Task<bool> SickLms::subscribe(bool on) {
   const bool again = on && streaming_;
-  if (!again && clock_.now() - last_scan_ > kForgetClock) forget_clock();
+  if (!again && (interrupted_ || clock_.now() - last_scan_ > kForgetClock)) forget_clock();
   if (!again && !interrupted_) {  // What was not asked for is not lost.
     sequence_ = LmsSequence();
     last_start_us_.reset();
@@ -342,6 +346,8 @@ bool SickLms::is_new(hal::Time arrival) {
   const auto later_us = static_cast<std::int32_t>(scan_.scan_start_us - last_start_us_.value_or(0));
   if (last_start_us_ && later_us < 0 && later_us > -1'000'000) {
     ++counts_.out_of_order;
+    in_order_ = 0;
+    troubles_.set(kDisorder, std::to_string(counts_.out_of_order) + " so far");
     return false;
   }
   const auto seen = sequence_.see(scan_);
@@ -354,6 +360,7 @@ bool SickLms::is_new(hal::Time arrival) {
   }
   if (seen == LmsSequence::Seen::restarted) forget_clock();
   stuck_ = 0;
+  if (++in_order_ == kCleanAgain) troubles_.clear(kDisorder);
   troubles_.clear(kStuck);
   troubles_.clear(kQuiet);
   last_start_us_ = scan_.scan_start_us;

@@ -113,7 +113,7 @@ class SickLms final : public hal::ProfileScanner, public Device {
   hal::Time last_scan_{};  // Arrival of the last new one, or of the subscription.
   double jitter_s_{};
   double lost_share_{};
-  int slow_{}, stuck_{}, late_{}, clean_{};  // How often in a row.
+  int slow_{}, stuck_{}, late_{}, clean_{}, in_order_{};  // How often in a row.
   std::uint64_t damaged_{};
   std::array<std::uint8_t, 2> status_{};
   std::vector<const Fault*> status_faults_;

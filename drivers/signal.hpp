@@ -1,52 +1,46 @@
-// How the parts of a loop wake each other, and how one at a time uses a link.
+// How the parts of a loop wait for each other with a deadline, and how one at a time uses a link.
 #pragma once
 
-#include <memory>
 #include <utility>
 
 #include "hal/clock.hpp"
+#include "hal/wake.hpp"
 
 namespace drivers {
 
-// Wakes one who waits. A notice with nobody waiting is kept for the next one, once.
 class Signal {
  public:
-  Signal();
-  ~Signal();
-
-  void notify();
-  // True when notified, false at the deadline.
+  void notify() { wake_.notify(); }
+  // True when notified while waiting, false at the deadline.
   hal::Task<bool> wait_until(hal::Clock& clock, hal::Time deadline);
 
  private:
-  struct Channel;
-  std::unique_ptr<Channel> channel_;
-  bool noticed_{};
+  hal::Wake wake_;
 };
 
-// Lets one through at a time, in the order of asking.
+// Lets one through at a time.
 class Turns {
  public:
-  Turns();
-  ~Turns();
-
-  // Holds the turn until it is destroyed.
+  // Held until destroyed; must not outlive its Turns.
   class Turn {
    public:
     explicit Turn(Turns* of) : of_(of) {}
     Turn(Turn&& other) noexcept : of_(std::exchange(other.of_, nullptr)) {}
     Turn& operator=(Turn&&) = delete;
-    ~Turn();
+    ~Turn() {
+      if (of_ != nullptr) of_->free();
+    }
 
    private:
     Turns* of_;
   };
-  // Outlives every turn it gave.
   hal::Task<Turn> take();
 
  private:
-  struct Channel;
-  std::unique_ptr<Channel> channel_;
+  void free();
+
+  hal::Wake freed_;
+  bool taken_{};
 };
 
 }  // namespace drivers

@@ -1,0 +1,111 @@
+// A simulated clock, a world and what drivers' loops need to be tested against simulated units.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <boost/asio/bind_cancellation_slot.hpp>
+#include <boost/asio/cancellation_signal.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/multiple_exceptions.hpp>
+#include <exception>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "drivers/device.hpp"
+#include "sim/links.hpp"
+#include "sim/sim_clock.hpp"
+#include "sim/unit_faults.hpp"
+#include "sim/world.hpp"
+#include "tests/sim/room.hpp"
+
+namespace drivers_test {
+
+// Members of a test stand below it, so that they are destroyed before the event loop.
+class LoopRig : public testing::Test {
+ protected:
+  LoopRig() : world(scene, world_config()) { EXPECT_TRUE(world.put_robot({{1.0, -0.5}, 0.3}, 0)); }
+  ~LoopRig() override { halt_all(); }
+
+  static sim::WorldConfig world_config() {
+    sim::WorldConfig config;
+    config.scanner.height_m = 1.5;
+    return config;
+  }
+
+  static void rethrow(std::exception_ptr error) {
+    if (!error) return;
+    try {
+      std::rethrow_exception(error);
+    } catch (const boost::asio::multiple_exceptions& both) {  // Of what was joined.
+      rethrow(both.first_exception());
+    } catch (const boost::system::system_error& e) {
+      if (e.code() != boost::asio::error::operation_aborted) throw;
+    }
+  }
+
+  // Runs until halt_all().
+  void spawn(hal::Task<void> task) {
+    stops.push_back(std::make_unique<boost::asio::cancellation_signal>());
+    boost::asio::co_spawn(io, std::move(task),
+                          boost::asio::bind_cancellation_slot(stops.back()->slot(), rethrow));
+  }
+  void halt_all() {
+    for (auto& stop : stops) stop->emit(boost::asio::cancellation_type::terminal);
+    io.restart();
+    io.poll();
+  }
+
+  // What a task returns; it may take an hour.
+  template <class T>
+  T result_of(hal::Task<T> task) {
+    std::optional<T> result;
+    std::exception_ptr failed;
+    boost::asio::co_spawn(io, std::move(task), [&](std::exception_ptr error, T value) {
+      failed = error;
+      if (!error) result = std::move(value);
+    });
+    const hal::Time limit = clock.now() + std::chrono::hours(1);
+    clock.run([&] { return result || failed || clock.now() > limit; });
+    if (failed) std::rethrow_exception(failed);
+    if (!result) throw std::runtime_error("it did not end within an hour");
+    return std::move(*result);
+  }
+  void run_for(hal::Duration span) { clock.run_until(clock.now() + span); }
+
+  bool running(const drivers::Device& device) {
+    return device.state() == drivers::DeviceState::running;
+  }
+  bool comes_up(const drivers::Device& device, hal::Duration within) {
+    const hal::Time limit = clock.now() + within;
+    clock.run([&] { return running(device) || clock.now() >= limit; });
+    return running(device);
+  }
+  // Until the device has a trouble of this name.
+  bool comes_to(const drivers::Device& device, std::string_view trouble, hal::Duration within) {
+    const hal::Time limit = clock.now() + within;
+    clock.run([&] { return has(device, trouble) || clock.now() >= limit; });
+    return has(device, trouble);
+  }
+  static bool has(const drivers::Device& device, std::string_view trouble) {
+    for (const auto& t : device.troubles())
+      if (t.fault->name == trouble) return true;
+    return false;
+  }
+  static std::string told(const drivers::Device& device) {
+    std::string text;
+    for (const auto& t : device.troubles())
+      text += std::string(t.fault->name) + ": " + t.detail + '\n';
+    return text;
+  }
+
+  boost::asio::io_context io;
+  sim::SimClock clock{io};
+  sim::Scene scene{sim_test::room(6, 5, 4)};
+  sim::World world;
+  std::vector<std::unique_ptr<boost::asio::cancellation_signal>> stops;
+};
+
+}  // namespace drivers_test
