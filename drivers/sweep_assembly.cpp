@@ -208,8 +208,8 @@ Eigen::Isometry3d SweepMount::T_P_L() const {
   upright << 1, 0, 0, 0, 0, -1, 0, 1, 0;
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
   T.linear() = (Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()) *
-                Eigen::AngleAxisd(pitch_rad, Eigen::Vector3d::UnitY()) *
-                Eigen::AngleAxisd(roll_rad, Eigen::Vector3d::UnitX()))
+                Eigen::AngleAxisd(roll_rad, Eigen::Vector3d::UnitX()) *
+                Eigen::AngleAxisd(-tilt_rad, Eigen::Vector3d::UnitY()))
                    .toRotationMatrix() *
                upright;
   T.translation() = P_offset_m;

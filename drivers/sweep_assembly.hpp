@@ -19,11 +19,13 @@
 
 namespace drivers {
 
-// What the robot file says of how the scanner hangs on the pan unit. Turned by yaw, then pitch,
-// then roll (Rz Ry Rx), from a scanner whose plane is upright with its x axis straight ahead and y
-// up. The offset along the pan axis shows only as the scanner's height.
+// What the robot file says of how the scanner hangs on the pan unit. Begins with an upright plane
+// whose x axis looks straight ahead and whose y axis looks up; tilted within its plane, then leaned
+// over to the right, then turned to the left. The offset along the pan axis shows only as the
+// scanner's height.
 struct SweepMount {
-  double roll_rad{}, pitch_rad{}, yaw_rad{};
+  double tilt_rad{};  // How high the scanner's straight ahead looks: 90 degrees is up.
+  double roll_rad{}, yaw_rad{};
   Eigen::Vector3d P_offset_m{0, 0, 0};  // Of the scanner's origin from the pan axis.
 
   Eigen::Isometry3d T_P_L() const;

@@ -126,7 +126,7 @@ TEST(SweepPlan, TurnsHalfACircleWhenTheMirrorSeesBothSides) {
 
 TEST(SweepPlan, TurnsTheWholeCircleWhenTheFarSideIsTooHigh) {
   SweepMount mount;
-  mount.pitch_rad = 30 * kDeg;  // Down: from -75 over the zenith to -15 behind it.
+  mount.tilt_rad = -30 * kDeg;  // Down: from -75 over the zenith to -15 behind it.
   const auto plan = plan_sweep(field(-60), lms1xx(), mount.T_P_L());
   ASSERT_EQ(plan.problem, "");
   EXPECT_FALSE(plan.both_sides);
@@ -176,7 +176,7 @@ TEST(SweepPlan, SaysWhatCannotBeHad) {
 TEST(SweepAssembly, PutsEveryBeamOfASkewedMountOnTheWalls) {
   SweepMount mount = looking_up();
   mount.roll_rad = 1.5 * kDeg;
-  mount.pitch_rad = -0.7 * kDeg;
+  mount.tilt_rad = 0.7 * kDeg;
   mount.yaw_rad = 2 * kDeg;
   const auto plan = plan_sweep(field(-44), lms1xx(), mount.T_P_L());
   ASSERT_EQ(plan.problem, "");
