@@ -7,30 +7,12 @@
 #include "sim/scan.hpp"
 #include "sim/sim_clock.hpp"
 #include "sim/surface_truth.hpp"
-#include "tests/sim/room.hpp"
+#include "tests/sim/town.hpp"
 
 namespace {
 
-// 300 x 300 m with 36 buildings; the ground in 160 x 160 squares, so 51 k triangles.
-sim::Mesh town() {
-  sim::Mesh mesh;
-  constexpr int kSquares = 160;
-  constexpr double kSide_m = 300.0 / kSquares;
-  for (int i = 0; i < kSquares; ++i)
-    for (int j = 0; j < kSquares; ++j) {
-      const double x = -150 + i * kSide_m, y = -150 + j * kSide_m;
-      mesh.add_quad({x, y, 0}, {x + kSide_m, y, 0}, {x + kSide_m, y + kSide_m, 0},
-                    {x, y + kSide_m, 0});
-    }
-  for (int i = 0; i < 36; ++i) {
-    const double x = -130 + i % 6 * 45, y = -130 + i / 6 * 45;
-    sim_test::add_box(mesh, {x, y, 0}, {x + 28, y + 14, 6.0 + i % 5 * 4});
-  }
-  return mesh;
-}
-
 void BM_Scan(benchmark::State& state) {
-  const sim::Scene scene(town());
+  const sim::Scene scene(sim_test::town());
   const sim::ScannerModel model;
   const auto pattern = sim::make_pattern(model);
   Eigen::Isometry3d T_W_S = Eigen::Isometry3d::Identity();
@@ -60,7 +42,7 @@ void BM_Sleep(benchmark::State& state) {
 BENCHMARK(BM_Sleep);
 
 void BM_JudgeSurface(benchmark::State& state) {
-  const sim::Mesh mesh = town();
+  const sim::Mesh mesh = sim_test::town();
   const sim::Scene scene(mesh);
   std::vector<Eigen::Vector3d> positions;
   for (double x = -149; x < 149; x += 1.3)
