@@ -4,6 +4,7 @@
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace sim {
 
@@ -15,7 +16,6 @@ using As = drivers::ColaValue::As;
 
 namespace {
 
-constexpr std::size_t kChunkMax = 64;
 constexpr hal::Duration kLatency = 1200us;  // As recorded of an LMS111.
 constexpr hal::Duration kStartLatency = 14ms;
 enum Kind { kAnswer, kScan = 1 << 20 };  // Of messages, for the fault `stuck`.
@@ -54,25 +54,14 @@ const SickLmsUnit::Known SickLmsUnit::kKnown[] = {
     {"sEN", "LMDscandata", &SickLmsUnit::subscribe},
 };
 
-// What the ranges that were cast ahead depend on.
-struct SickLmsUnit::Key {
-  std::uint64_t pan_changes{};
-  StandingPose at;
-
-  bool operator==(const Key& other) const {
-    return pan_changes == other.pan_changes && at.pose.position_m == other.at.pose.position_m &&
-           at.pose.heading_rad == other.at.pose.heading_rad && at.ground_z_m == other.at.ground_z_m;
-  }
-};
-
 SickLmsUnit::SickLmsUnit(SickLmsUnitConfig config, World& world, hal::Clock& clock,
                          hal::ByteStream& link, UnitFaults& faults, const PanTruth& pan)
     : config_(std::move(config)),
-      world_(world),
       clock_(clock),
       faults_(faults),
       link_(link, clock, faults),
-      pan_(pan) {
+      ahead_({config_.ranges, config_.T_P_L, config_.seed, config_.threads}, world, clock, pan,
+             [this](std::uint64_t number) { return turn_start(number); }) {
   settings_.lms5xx = config_.lms5xx;
   restart();
   ready_ = clock.now();  // It was on before the robot.
@@ -98,7 +87,7 @@ void SickLmsUnit::restart() {
   turning_since_ = powered_;
   turns_before_ = since_start_ = 0;
   telegram_counter_ = 0;
-  caster_.reset();
+  cast_anew_ = true;
 }
 
 // Without power, or not yet up after it came back.
@@ -247,7 +236,7 @@ Bytes SickLmsUnit::start_measuring(const Message& message) {
   if (!measuring_) turning_since_ = clock_.now() + kStartLatency;
   measuring_ = true;
   since_start_ = 0;
-  caster_.reset();
+  cast_anew_ = true;
   const ColaValue answer[] = {{As::u8, 0}};
   return say(message, answer);
 }
@@ -389,7 +378,7 @@ hal::Task<void> SickLmsUnit::stream() {
       paced_by_ = faults_.generation();
       turning_since_ = clock_.now();
       turns_before_ = number;
-      caster_.reset();
+      cast_anew_ = true;
     }
     const double jitter = uniform(config_.seed + 1, number);
     const hal::Duration sent_after = config_.lms5xx ? 40200us + hal::from_seconds(0.8e-3 * jitter)
@@ -402,7 +391,12 @@ hal::Task<void> SickLmsUnit::stream() {
       continue;
     }
     if (number % settings_.every_nth_scan == 0) {
-      fill(number, ranges_of(number));
+      if (std::exchange(cast_anew_, false)) {
+        const MirrorArc beams = arc();
+        const double turns = beams.beams * beams.angle_step_rad / (2 * std::numbers::pi);
+        ahead_.set_arc(beams, hal::from_seconds(period_s() * turns));
+      }
+      fill(number, ahead_.of(number));
       scan_.transmit_us = device_us(sent);
       const Bytes bytes = drivers::encode_lms_scan(dialect_, "sSN", scan_);
       const bool twice = !config_.lms5xx && since_start_ == 17;  // As recorded now and then.
@@ -452,44 +446,6 @@ void SickLmsUnit::fill(std::uint64_t number, std::span<const float> ranges_m) {
   for (std::size_t i = 0; i < ranges_m.size(); ++i)
     remission.raw[i] =
         ranges_m[i] > 0 ? static_cast<std::uint16_t>(20000 / (1 + ranges_m[i])) : std::uint16_t{0};
-}
-
-// Of one turn, from what was cast ahead.
-std::span<const float> SickLmsUnit::ranges_of(std::uint64_t number) {
-  world_.advance(clock_.now());
-  const auto& placed = world_.placed_scanner();
-  const Key key{pan_.changes(), placed ? *placed : world_.robot()};
-  const auto beams = std::size_t{arc().beams};
-  const auto ahead = [&] {
-    return caster_ && ahead_key_ && *ahead_key_ == key && !ahead_turns_.empty() &&
-           number >= ahead_turns_.front().number && number <= ahead_turns_.back().number;
-  };
-  if (!ahead()) {
-    const bool used_up = ahead_key_ && *ahead_key_ == key;
-    chunk_ = used_up ? std::min(2 * chunk_, kChunkMax) : 4;
-    ahead_key_ = std::make_unique<Key>(key);
-    cast_ahead(number);
-  }
-  const std::size_t at = (number - ahead_turns_.front().number) * beams;
-  return std::span<const float>(ahead_m_).subspan(at, beams);
-}
-
-void SickLmsUnit::cast_ahead(std::uint64_t number) {
-  const MirrorArc beams = arc();
-  if (!caster_)
-    caster_ = std::make_unique<ProfileCaster>(world_.scene(), config_.ranges, beams, config_.T_P_L,
-                                              config_.seed);
-  const double beam_s = period_s() * beams.angle_step_rad / (2 * std::numbers::pi);
-  const hal::Duration arc_time = hal::from_seconds(beam_s * beams.beams);
-  ahead_turns_.clear();
-  for (std::size_t i = 0; i < chunk_; ++i) {
-    const hal::Time start = turn_start(number + i);
-    ahead_turns_.push_back({number + i, pan_.angle_rad(start), pan_.angle_rad(start + arc_time)});
-  }
-  ahead_m_.resize(chunk_ * beams.beams);
-  const auto T_W_S = ahead_key_->at.T_W_S(world_.config().scanner.height_m);
-  caster_->cast(T_W_S, ahead_turns_, config_.threads, ahead_m_);
-  cast_ += chunk_;
 }
 
 }  // namespace sim

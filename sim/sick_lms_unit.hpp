@@ -3,7 +3,6 @@
 
 #include <Eigen/Geometry>
 #include <array>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,8 +12,8 @@
 #include "hal/clock.hpp"
 #include "hal/links.hpp"
 #include "hal/wake.hpp"
+#include "sim/cast_ahead.hpp"
 #include "sim/pan_truth.hpp"
-#include "sim/profile_caster.hpp"
 #include "sim/unit_faults.hpp"
 #include "sim/world.hpp"
 
@@ -52,10 +51,9 @@ class SickLmsUnit {
   void set_status(std::uint8_t status) { status_ = status; }
   bool streaming() const { return streaming_; }
   std::uint64_t scans_sent() const { return scans_sent_; }
-  std::uint64_t profiles_cast() const { return cast_; }  // Those thrown away included.
+  std::uint64_t profiles_cast() const { return ahead_.turns_cast(); }
 
  private:
-  struct Key;
   using Message = drivers::ColaMessage;
   using Handler = drivers::Bytes (SickLmsUnit::*)(const Message&);
   struct Known;
@@ -95,16 +93,12 @@ class SickLmsUnit {
   std::uint32_t device_us(hal::Time time) const;
   hal::Time turn_start(std::uint64_t number) const;
   MirrorArc arc() const;
-  std::span<const float> ranges_of(std::uint64_t number);
-  void cast_ahead(std::uint64_t number);
   void fill(std::uint64_t number, std::span<const float> ranges_m);
 
   const SickLmsUnitConfig config_;
-  World& world_;
   hal::Clock& clock_;
   UnitFaults& faults_;
   FaultyStream link_;
-  const PanTruth& pan_;
 
   drivers::ColaDialect dialect_ = drivers::ColaDialect::binary;
   drivers::LmsSettings settings_;
@@ -116,14 +110,11 @@ class SickLmsUnit {
   hal::Time turning_since_{};  // When mirror turn 0 of the present settings began.
   std::uint64_t turns_before_{}, paced_by_{};
   std::uint16_t telegram_counter_{};
-  std::uint64_t scans_sent_{}, since_start_{}, cast_{};
+  std::uint64_t scans_sent_{}, since_start_{};
   drivers::LmsScan scan_;
 
-  std::unique_ptr<ProfileCaster> caster_;
-  std::unique_ptr<Key> ahead_key_;
-  std::vector<MirrorTurn> ahead_turns_;
-  std::vector<float> ahead_m_;
-  std::size_t chunk_ = 4;
+  CastAhead ahead_;
+  bool cast_anew_ = true;
 };
 
 }  // namespace sim

@@ -1,0 +1,62 @@
+// The ranges of a turning mirror, cast in chunks before they are needed: as the pan axis will turn
+// and the robot will stand if nothing changes that. What turns out otherwise is thrown away, so the
+// ranges are always those of the latest truth.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "hal/clock.hpp"
+#include "sim/pan_truth.hpp"
+#include "sim/profile_caster.hpp"
+#include "sim/world.hpp"
+
+namespace sim {
+
+class CastAhead {
+ public:
+  struct Config {
+    ScannerModel ranges;  // Of it the ranges, their noise and the losses count.
+    Eigen::Isometry3d T_P_L = Eigen::Isometry3d::Identity();
+    std::uint64_t seed = 1;
+    int threads = 2;
+  };
+  // When turn `number` begins.
+  using TurnStart = std::function<hal::Time(std::uint64_t)>;
+
+  CastAhead(Config config, World& world, hal::Clock& clock, const PanTruth& pan, TurnStart start);
+
+  // Another arc, or turns that begin at other times: forgets what was cast.
+  void set_arc(const MirrorArc& arc, hal::Duration arc_time);
+  // One turn's ranges in metres, 0 where nothing comes back; until the next call.
+  std::span<const float> of(std::uint64_t number);
+
+  std::uint64_t turns_cast() const { return turns_cast_; }  // Those thrown away included.
+
+ private:
+  struct Key {
+    std::uint64_t pan_changes{};
+    StandingPose at;
+    bool operator==(const Key& other) const;
+  };
+  void cast(std::uint64_t number);
+
+  const Config config_;
+  World& world_;
+  hal::Clock& clock_;
+  const PanTruth& pan_;
+  const TurnStart start_;
+  MirrorArc arc_;
+  hal::Duration arc_time_{};
+  std::unique_ptr<ProfileCaster> caster_;
+  std::optional<Key> key_;
+  std::vector<MirrorTurn> turns_;
+  std::vector<float> ranges_m_;
+  std::size_t chunk_ = 4;
+  std::uint64_t turns_cast_{};
+};
+
+}  // namespace sim
