@@ -32,30 +32,15 @@ constexpr Fault kReadBack{6, "settings differ", "the scanner is not set as it wa
                           "let no other program set it; if it stays, restart the scanner"};
 constexpr Fault kQuiet{7, "scans stopped", "the connection or the scanner hangs",
                        "it is restarted by itself; if it stays, switch its power off and on"};
-constexpr Fault kStuck{8, "same scan again and again", "the scanner's measurement hangs",
-                       "switch its power off and on"};
-constexpr Fault kSlow{9, "scans too slow", "the mirror does not reach its speed",
-                      "wait for the spin-up; if it stays, replace the scanner"};
-constexpr Fault kLosing{10, "scans get lost", "the connection or this computer is too slow",
-                        "check cable and network load"};
-constexpr Fault kLate{11, "scans come late", "something between scanner and computer holds them up",
-                      "connect directly; take other traffic off the line"};
-constexpr Fault kDamaged{12, "damaged telegrams", "bytes change or go missing on the way",
+constexpr Fault kDamaged{8, "damaged telegrams", "bytes change or go missing on the way",
                          "check the cable and its shield"};
-
-constexpr Fault kDisorder{13, "scans out of order",
-                          "something on the way holds some telegrams back",
-                          "connect directly, over TCP"};
 
 constexpr hal::Duration kStartTimeout = 10s;
 constexpr hal::Duration kProfileTimeout = 2s;
 constexpr hal::Duration kAliveEvery = 10s;
 constexpr hal::Duration kForgetClock = 60s;  // Without scans the wraps cannot be told any more.
-constexpr int kInARow = 10;
 constexpr int kCleanAgain = 100;
 constexpr std::uint32_t kJustStarted = 0x0100;
-constexpr double kLate_s = 0.1;
-constexpr double kLosingShare = 0.01;
 
 std::uint64_t bytes_skipped(const Resync& resync) {
   std::uint64_t bytes = 0;
@@ -79,7 +64,11 @@ std::string_view SickLms::model() const {
 }
 
 SickLms::Counts SickLms::counts() const {
-  return counts_;
+  Counts counts = counts_;
+  counts.lost += queue_.dropped();
+  counts.repeated = watch_.repetitions();
+  counts.out_of_order = watch_.disorders();
+  return counts;
 }
 
 double SickLms::period_s() const {
@@ -247,7 +236,7 @@ hal::Task<bool> SickLms::subscribe(bool on) {
   if (!again && !interrupted_) {  // What was not asked for is not lost.
     sequence_ = LmsSequence();
     last_start_us_.reset();
-    profiles_.clear();
+    queue_.clear();
   }
   if (!again) last_scan_ = clock_.now();
   const auto steps = on ? lms_startup(dialect_, config_.settings) : lms_stop(dialect_);
@@ -286,13 +275,7 @@ hal::Task<hal::Result<void>> SickLms::stop() {
 
 hal::Task<hal::Result<hal::Profile>> SickLms::next_profile() {
   if (!wanted_) co_return make_error_code(boost::system::errc::operation_not_permitted);
-  const hal::Time deadline = clock_.now() + kProfileTimeout;
-  while (profiles_.empty())
-    if (!co_await arrived_.wait_until(clock_, deadline))
-      co_return make_error_code(boost::system::errc::timed_out);
-  hal::Profile profile = std::move(profiles_.front());
-  profiles_.pop_front();
-  co_return profile;
+  co_return co_await queue_.next(clock_, kProfileTimeout);
 }
 
 void SickLms::take(ByteView frame, hal::Time arrival) {
@@ -332,11 +315,11 @@ void SickLms::take_scan(const ColaMessage& message, hal::Time arrival) {
   const std::uint64_t lost = sequence_.lost() - lost_before;
   const auto step_us = previous_us ? scan_.scan_start_us - *previous_us : 0U;
   counts_.lost += lost;
-  lost_share_ += (static_cast<double>(lost) / static_cast<double>(lost + 1) - lost_share_) / 100;
-  judge_scan(lost > 0 ? 0 : step_us / 1e6);
+  judge_damage();
+  judge_status();
   const std::int64_t sent_us = unwrap_us_(scan_.transmit_us);
   fit_.add(sent_us * 1000, arrival);
-  jitter_s_ = std::max(jitter_s_ * 0.98, fit_.last_excess_s());
+  watch_.came(step_us / 1e6, period_s(), fit_.last_excess_s(), lost);
   const std::uint32_t before_sending_us = scan_.transmit_us - scan_.scan_start_us;
   add_profile(*channel, *fit_.to_ours((sent_us - before_sending_us) * 1000), lost);
 }
@@ -345,47 +328,19 @@ void SickLms::take_scan(const ColaMessage& message, hal::Time arrival) {
 bool SickLms::is_new(hal::Time arrival) {
   const auto later_us = static_cast<std::int32_t>(scan_.scan_start_us - last_start_us_.value_or(0));
   if (last_start_us_ && later_us < 0 && later_us > -1'000'000) {
-    ++counts_.out_of_order;
-    in_order_ = 0;
-    troubles_.set(kDisorder, std::to_string(counts_.out_of_order) + " so far");
+    watch_.out_of_order();
     return false;
   }
   const auto seen = sequence_.see(scan_);
   if (seen == LmsSequence::Seen::repeated) {
-    ++counts_.repeated;
-    if (++stuck_ == kInARow)
-      troubles_.set(kStuck, "scan " + std::to_string(scan_.scan_counter) + " came " +
-                                std::to_string(stuck_ + 1) + " times");
+    watch_.repeated("scan " + std::to_string(scan_.scan_counter));
     return false;
   }
   if (seen == LmsSequence::Seen::restarted) forget_clock();
-  stuck_ = 0;
-  if (++in_order_ == kCleanAgain) troubles_.clear(kDisorder);
-  troubles_.clear(kStuck);
   troubles_.clear(kQuiet);
   last_start_us_ = scan_.scan_start_us;
   last_scan_ = arrival;
   return true;
-}
-
-// `step_s` from the start of the scan before, 0 where that is not known.
-void SickLms::judge_scan(double step_s) {
-  const auto in_a_row = [&](bool bad, int& count, const Fault& fault, auto detail) {
-    count = bad ? count + 1 : 0;
-    if (count == kInARow) troubles_.set(fault, detail());
-    if (count == 0) troubles_.clear(fault);
-  };
-  if (step_s > 0)
-    in_a_row(step_s > 1.2 * period_s(), slow_, kSlow,
-             [&] { return "one every " + ms(step_s) + " instead of " + ms(period_s()); });
-  in_a_row(fit_.last_excess_s() > kLate_s, late_, kLate,
-           [&] { return "by " + ms(fit_.last_excess_s()); });
-  if (lost_share_ > kLosingShare)
-    troubles_.set(kLosing, std::to_string(std::lround(lost_share_ * 1000)) + " of 1000");
-  else if (lost_share_ < kLosingShare / 2)
-    troubles_.clear(kLosing);
-  judge_damage();
-  judge_status();
 }
 
 void SickLms::judge_damage() {
@@ -430,16 +385,9 @@ void SickLms::add_profile(const LmsChannel& channel, hal::Time stamp, std::uint6
   }
   for (const auto& rssi : scan_.channels16)
     if (rssi.label() == "RSSI1") profile.intensities.assign(rssi.raw.begin(), rssi.raw.end());
-  if (profiles_.size() >= config_.profiles_max) {
-    const std::uint64_t lost_with_it = 1 + profiles_.front().lost_before;
-    profiles_.pop_front();
-    profiles_.front().lost_before += lost_with_it;
-    ++counts_.lost;
-  }
   profile.lost_before = lost;
-  profiles_.push_back(std::move(profile));
+  queue_.put(std::move(profile));
   ++counts_.profiles;
-  arrived_.notify();
 }
 
 }  // namespace drivers

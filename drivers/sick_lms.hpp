@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
@@ -10,6 +9,7 @@
 
 #include "drivers/clock_fit.hpp"
 #include "drivers/device.hpp"
+#include "drivers/profile_stream.hpp"
 #include "drivers/resync.hpp"
 #include "drivers/sick_lms_codec.hpp"
 #include "drivers/sick_lms_startup.hpp"
@@ -55,7 +55,9 @@ class SickLms final : public hal::ProfileScanner, public Device {
     std::uint64_t profiles{}, lost{}, repeated{}, out_of_order{}, unreadable{}, sessions{};
   };
   Counts counts() const;
-  double clock_jitter_s() const { return jitter_s_; }  // Of arrivals, over the last second or so.
+  double clock_jitter_s() const {
+    return watch_.jitter_s();
+  }  // Of arrivals, over the last second or so.
   double clock_skew() const { return fit_.skew(); }
 
  private:
@@ -81,7 +83,6 @@ class SickLms final : public hal::ProfileScanner, public Device {
   void take(ByteView frame, hal::Time arrival);
   void take_scan(const ColaMessage& message, hal::Time arrival);
   bool is_new(hal::Time arrival);
-  void judge_scan(double step_s);
   void judge_damage();
   void judge_status();
   bool as_set_up(const LmsChannel& channel) const;
@@ -101,7 +102,7 @@ class SickLms final : public hal::ProfileScanner, public Device {
   ColaDialect dialect_ = ColaDialect::binary;
   const LmsStep* asked_{};
   std::optional<Answer> answer_;
-  Signal answered_, changed_, switched_, arrived_;
+  Signal answered_, changed_, switched_;
   bool wanted_{}, streaming_{}, set_up_lost_{}, interrupted_{};
   std::uint64_t bytes_{};
 
@@ -111,13 +112,12 @@ class SickLms final : public hal::ProfileScanner, public Device {
   ClockFit fit_;
   std::optional<std::uint32_t> last_start_us_;
   hal::Time last_scan_{};  // Arrival of the last new one, or of the subscription.
-  double jitter_s_{};
-  double lost_share_{};
-  int slow_{}, stuck_{}, late_{}, clean_{}, in_order_{};  // How often in a row.
+  ScanWatch watch_{troubles_};
+  int clean_{};  // Scans in a row without damaged bytes.
   std::uint64_t damaged_{};
   std::array<std::uint8_t, 2> status_{};
   std::vector<const Fault*> status_faults_;
-  std::deque<hal::Profile> profiles_;
+  ProfileQueue queue_{config_.profiles_max};
   Counts counts_;
 };
 
