@@ -47,7 +47,7 @@ class FlirPtu final : public hal::PanUnit, public Device {
   hal::Task<void> run() override;
   DeviceState state() const override { return state_; }
   const Identity& identity() const override { return identity_; }
-  std::vector<Trouble> troubles() const override { return troubles_.now(); }
+  std::vector<Trouble> troubles() const override { return troubles_.all(); }
 
   double step_rad() const;  // 0 before it was identified.
   std::optional<PtuHealth> health() const { return health_; }

@@ -45,7 +45,7 @@ class Hokuyo final : public hal::ProfileScanner, public Device {
   hal::Task<void> run() override;
   DeviceState state() const override { return state_; }
   const Identity& identity() const override { return identity_; }
-  std::vector<Trouble> troubles() const override { return troubles_.now(); }
+  std::vector<Trouble> troubles() const override { return troubles_.all(); }
 
   std::uint64_t profiles() const { return profiles_; }
   std::uint64_t lost() const { return lost_scans_ + queue_.dropped(); }

@@ -48,7 +48,7 @@ class SickLms final : public hal::ProfileScanner, public Device {
   hal::Task<void> run() override;
   DeviceState state() const override { return state_; }
   const Identity& identity() const override { return identity_; }
-  std::vector<Trouble> troubles() const override { return troubles_.now(); }
+  std::vector<Trouble> troubles() const override { return troubles_.all(); }
 
   // Since the beginning.
   struct Counts {

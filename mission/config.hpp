@@ -25,14 +25,53 @@ struct BodyConfig {
 struct ScannerConfig {
   double height_m = 1.8;
   double range_min_m = 1.0;
-  double range_max_m = 100.0;
+  double range_max_m = 80.0;
   double grazing_max_deg = 70.0;
   double fov_deg = 360.0;
   double azimuth_step_deg = 0.2;
   double elevation_min_deg = -60.0;
   double elevation_max_deg = 90.0;
-  double elevation_step_deg = 0.05;
-  double scan_s = 300.0;
+  double elevation_step_deg = 0.1667;
+  double scan_s = 90.0;
+  std::string device = "sick-lms5xx";
+  std::string link = "tcp:192.168.0.1:2112";
+  double tilt_deg = 35.0;  // How high the profile scanner's straight ahead looks; it is upright.
+};
+
+// [drive] of the robot file.
+struct DriveConfig {
+  std::string device = "agilex-scout2";
+  std::string link = "can:can0";
+  // Of two CiA 402 drives; found at commissioning.
+  int left_node = 1, right_node = 2;
+  double left_units_per_mps = 1000, right_units_per_mps = 1000;
+  double left_counts_per_m = 10'000, right_counts_per_m = 10'000;
+};
+
+// [pan]: what turns a profile scanner.
+struct PanConfig {
+  std::string device = "flir-ptu";
+  std::string link = "serial:/dev/ttyUSB0@9600";
+  double angle_max_deg = 185;  // To both sides: a slip-ring model; others reach 159.
+  bool counter_clockwise = false;
+  bool stop_and_go = false;
+};
+
+// [imu], [gnss]
+struct ImuConfig {
+  std::string device = "vn100";
+  std::string link = "serial:/dev/ttyUSB1@115200";
+};
+struct GnssConfig {
+  std::string device = "ublox";
+  std::string link = "serial:/dev/ttyACM0@38400";
+};
+
+// [power]: links of Modbus units; empty where the robot has none.
+struct PowerConfig {
+  std::string battery_link;  // A Victron battery service.
+  std::string board_link;    // A Waveshare relay board with the e-stop's contacts.
+  std::string safety_link;   // A Pilz safety controller.
 };
 
 // [sim] of the robot file: how the simulated world misbehaves. One-sigma values.
@@ -58,9 +97,14 @@ struct BatteryConfig {
 
 struct RobotConfig {
   std::string name = "robot";
-  std::string backend = "sim";  // "sim" (hardware backends come with the drivers)
+  std::string backend = "sim";
   BodyConfig body;
+  DriveConfig drive;
   ScannerConfig scanner;
+  PanConfig pan;
+  ImuConfig imu;
+  GnssConfig gnss;
+  PowerConfig power;
   BatteryConfig battery;
   SimConfig sim;
 };

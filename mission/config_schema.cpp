@@ -156,6 +156,87 @@ SectionSpec body_section() {
           {}};
 }
 
+SectionSpec drive_section() {
+  using D = DriveConfig;
+  const Keys<D> keys{[](MissionConfig& c) -> D& { return c.robot.drive; }};
+  return {ConfigFile::robot,
+          "drive",
+          "What moves it.",
+          {keys.other("device", &D::device, "An AgileX base, or two CiA 402 drives",
+                      {"agilex-scout2", "agilex-scout-mini", "agilex-bunker", "cia402"}),
+           keys.other("link", &D::link, "Where it is: can:can0, gs_usb:SERIAL/CHANNEL@500000"),
+           keys.number("left_node", &D::left_node, 1, 126, "", "Node id of a CiA 402 drive"),
+           keys.number("right_node", &D::right_node, 1, 126, "", "The same on the right"),
+           keys.number("left_units_per_mps", &D::left_units_per_mps, -1e9, 1e9, "",
+                       "Of its velocity; negative where the motor is mirrored"),
+           keys.number("right_units_per_mps", &D::right_units_per_mps, -1e9, 1e9, "",
+                       "The same on the right"),
+           keys.number("left_counts_per_m", &D::left_counts_per_m, -1e9, 1e9, "",
+                       "Of its position; negative where the motor is mirrored"),
+           keys.number("right_counts_per_m", &D::right_counts_per_m, -1e9, 1e9, "",
+                       "The same on the right")},
+          {},
+          {}};
+}
+
+SectionSpec pan_section() {
+  using P = PanConfig;
+  const Keys<P> keys{[](MissionConfig& c) -> P& { return c.robot.pan; }};
+  return {ConfigFile::robot,
+          "pan",
+          "What turns the profile scanner.",
+          {keys.other("device", &P::device, "A FLIR PTU", {"flir-ptu"}),
+           keys.other("link", &P::link, "Where it is: serial:/dev/ttyUSB0@9600, tcp:HOST:4000"),
+           keys.number("angle_max_deg", &P::angle_max_deg, 10, 360, "deg",
+                       "To both sides; 159 where there is no slip ring"),
+           keys.other("counter_clockwise", &P::counter_clockwise,
+                      "Whether positive positions turn that way seen from above"),
+           keys.other("stop_and_go", &P::stop_and_go,
+                      "Stand still for every profile instead of turning evenly")},
+          {},
+          {}};
+}
+
+SectionSpec imu_section() {
+  using I = ImuConfig;
+  const Keys<I> keys{[](MissionConfig& c) -> I& { return c.robot.imu; }};
+  return {ConfigFile::robot,
+          "imu",
+          "What feels turning.",
+          {keys.other("device", &I::device, "A VectorNav VN-100", {"vn100"}),
+           keys.other("link", &I::link, "Where it is: serial:/dev/ttyUSB1@115200")},
+          {},
+          {}};
+}
+
+SectionSpec gnss_section() {
+  using G = GnssConfig;
+  const Keys<G> keys{[](MissionConfig& c) -> G& { return c.robot.gnss; }};
+  return {ConfigFile::robot,
+          "gnss",
+          "What hears satellites.",
+          {keys.other("device", &G::device, "A u-blox, any NMEA receiver, or a gpsd",
+                      {"ublox", "nmea", "gpsd"}),
+           keys.other("link", &G::link, "Where it is: serial:/dev/ttyACM0@38400, tcp:HOST:2947")},
+          {},
+          {}};
+}
+
+SectionSpec power_section() {
+  using P = PowerConfig;
+  const Keys<P> keys{[](MissionConfig& c) -> P& { return c.robot.power; }};
+  return {ConfigFile::robot,
+          "power",
+          "Supply, relays and safety inputs over Modbus; leave out what the robot has not.",
+          {keys.other("battery_link", &P::battery_link,
+                      "A Victron battery service: modbus-tcp:HOST:502/UNIT"),
+           keys.other("board_link", &P::board_link,
+                      "A Waveshare relay board: modbus-rtu:/dev/ttyUSB2@9600N/UNIT"),
+           keys.other("safety_link", &P::safety_link, "A Pilz PNOZmulti: modbus-tcp:HOST:502/1")},
+          {},
+          {}};
+}
+
 SectionSpec scanner_section() {
   using S = ScannerConfig;
   const Keys<S> keys{[](MissionConfig& c) -> S& { return c.robot.scanner; }};
@@ -175,7 +256,12 @@ SectionSpec scanner_section() {
            keys.number("elevation_max_deg", &S::elevation_max_deg, -90, 90, "deg", "Highest beam"),
            keys.number("elevation_step_deg", &S::elevation_step_deg, 0.005, 10, "deg",
                        "Between neighbouring beams of a column"),
-           keys.number("scan_s", &S::scan_s, 0, 86'400, "s", "Time one scan takes")},
+           keys.number("scan_s", &S::scan_s, 0, 86'400, "s",
+                       "Time one scan takes, for plans; the devices take what they take"),
+           keys.other("device", &S::device, "What measures", {"sick-lms5xx", "sick-lms1xx"}),
+           keys.other("link", &S::link, "Where it is: tcp:HOST:PORT"),
+           keys.number("tilt_deg", &S::tilt_deg, -90, 180, "deg",
+                       "How high a profile scanner's straight ahead looks; 90 is up")},
           {},
           {}};
 }
@@ -296,9 +382,10 @@ std::string_view name(ConfigFile file) {
 
 const std::vector<SectionSpec>& config_schema() {
   static const std::vector<SectionSpec> schema{
-      mission_section(), phase1_section(), phase2_section(),  regions_section(),
-      robot_section(),   body_section(),   scanner_section(), battery_section(),
-      sim_section(),     plan_section(),   station_section()};
+      mission_section(), phase1_section(), phase2_section(), regions_section(),
+      robot_section(),   body_section(),   drive_section(),  scanner_section(),
+      pan_section(),     imu_section(),    gnss_section(),   power_section(),
+      battery_section(), sim_section(),    plan_section(),   station_section()};
   return schema;
 }
 

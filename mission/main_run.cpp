@@ -50,20 +50,31 @@ void save_products(RunStore& store, const Survey& survey) {
   store.finish().value();
 }
 
+constexpr hal::Duration kStartPatience = std::chrono::seconds(60);
+
+hal::Task<void> start_and_survey(RobotDrivers& drivers, Survey& survey) {
+  const hal::Result<void> started = co_await drivers.started(kStartPatience);
+  if (started.has_error())
+    throw std::runtime_error("not every device started: " + drivers.not_running());
+  co_await survey.run();
+}
+
 // Runs the survey to its end; returns what went wrong, or "".
 std::string run_survey(SimBackend& backend, Survey& survey) {
   bool ended = false;
   std::string failure;
-  boost::asio::co_spawn(backend.io(), survey.run(), [&](std::exception_ptr error) {
+  const auto on_end = [&](std::exception_ptr error) {
     ended = true;
     try {
       if (error) std::rethrow_exception(error);
     } catch (const std::exception& e) {
       failure = e.what();
     }
-  });
+  };
+  boost::asio::co_spawn(backend.io(), start_and_survey(backend.drivers(), survey), on_end);
   if (!backend.run([&] { return ended; }))
-    return "the mission waits for something that cannot come";
+    return backend.failure().empty() ? "the mission waits for something that cannot come"
+                                     : backend.failure();
   return failure;
 }
 
@@ -77,6 +88,9 @@ Prepared prepare(const std::filesystem::path& mission_file, const Overrides& ove
   prepared.site = std::move(check.site);
   prepared.notes = check.notes;
   prepared.errors = check.errors;
+  if (!prepared.errors.empty()) return prepared;
+  for (const ConfigError& problem : robot_problems(prepared.config))
+    prepared.errors.push_back(problem);
   if (!prepared.errors.empty()) return prepared;
   if (use != WorldUse::none) load_world(prepared, check, use, model_file, check.areas);
   if (!prepared.errors.empty()) return prepared;

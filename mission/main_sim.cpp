@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/asio/co_spawn.hpp>
 #include <cmath>
 #include <numbers>
 
@@ -24,6 +25,9 @@ constexpr double radians(double degrees) {
 constexpr double kGroundSampleM = 4.0;
 // Ways are looked for in steps of this: a gap that leaves the robot this much play is a way.
 constexpr double kReachCellM = 0.25;
+
+// Where simulated sites lie on the earth: somewhere, as long as all agree.
+constexpr drivers::GeoAnchor kAnchor{48.0, 11.0, 500, 0};
 
 sim::ScannerModel scanner_model(const RobotConfig& robot) {
   const ScannerConfig& scanner = robot.scanner;
@@ -133,8 +137,11 @@ SimBackend::SimBackend(const MissionConfig& config, const SiteTasks& tasks, SimS
       site_(std::move(site)),
       scene_(site_.mesh),
       world_(scene_, world_config(config, tasks, threads)),
-      robot_(world_, clock_),
-      devices_(robot_.devices()) {
+      robot_(config.robot, kAnchor, config.seed, threads, world_, clock_),
+      scanner_(robot_.drivers().scanner(), world_, clock_),
+      placement_(world_, clock_),
+      devices_{robot_.drivers().drive(), robot_.drivers().imu(), robot_.drivers().gnss(), scanner_,
+               placement_} {
   if (tasks.start_area < 0) return;
   if (!world_.put_robot(tasks.start, start_ground_z_m(tasks)))
     throw std::runtime_error(fmt::format(
@@ -142,6 +149,20 @@ SimBackend::SimBackend(const MissionConfig& config, const SiteTasks& tasks, SimS
         "no "
         "ground near {:.2f} m; move the map's `start`",
         tasks.start.position_m.x(), tasks.start.position_m.y(), start_ground_z_m(tasks)));
+}
+
+bool SimBackend::run(const std::function<bool()>& done) {
+  if (!started_)
+    boost::asio::co_spawn(io_, robot_.run(), [this](std::exception_ptr error) {
+      try {
+        if (error) std::rethrow_exception(error);
+        failure_ = "the robot's devices ended by themselves";
+      } catch (const std::exception& e) {
+        failure_ = e.what();
+      }
+    });
+  started_ = true;
+  return clock_.run([&] { return done() || !failure_.empty(); }) && done();
 }
 
 Truth SimBackend::judge(RunRecord& record, const SiteModel& model,

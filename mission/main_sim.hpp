@@ -10,13 +10,15 @@
 #include <vector>
 
 #include "mission/config.hpp"
+#include "mission/main_units.hpp"
 #include "mission/plan.hpp"
 #include "mission/record.hpp"
 #include "mission/site_model.hpp"
-#include "sim/devices.hpp"
+#include "sim/placement.hpp"
 #include "sim/mesh.hpp"
 #include "sim/scene.hpp"
 #include "sim/sim_clock.hpp"
+#include "sim/witnessed_scanner.hpp"
 #include "sim/world.hpp"
 
 namespace mission {
@@ -45,8 +47,12 @@ class SimBackend {
   hal::Clock& clock() { return clock_; }
   hal::Devices& devices() { return devices_; }
   boost::asio::io_context& io() { return io_; }
-  // Runs until done() holds, or nothing is left to run.
-  bool run(const std::function<bool()>& done) { return clock_.run(done); }
+  RobotDrivers& drivers() { return robot_.drivers(); }
+  RobotUnits& units() { return robot_.units(); }
+  // Starts units and drivers, and runs until done() holds. False when they ended by themselves, or
+  // nothing is left to run: failure() may say why.
+  bool run(const std::function<bool()>& done);
+  const std::string& failure() const { return failure_; }
 
   // Puts the true poses beside the believed ones and counts the surface that was to be seen. Writes
   // the scanner positions that it judged from, one "x_m,y_m,z_m" a line, the scans first, where
@@ -70,8 +76,12 @@ class SimBackend {
   boost::asio::io_context io_{1};
   sim::SimClock clock_{io_};
   sim::World world_;
-  sim::Robot robot_;
+  SimulatedRobot robot_;
+  sim::WitnessedScanner scanner_;
+  sim::SimPlacement placement_;
   hal::Devices devices_;
+  bool started_ = false;
+  std::string failure_;
 };
 
 }  // namespace mission

@@ -11,7 +11,7 @@
 #include "nav/polygons.hpp"
 #include "sim/agilex_unit.hpp"
 #include "sim/cia402_unit.hpp"
-#include "sim/devices.hpp"
+#include "tests/support/direct_devices.hpp"
 #include "sim/links.hpp"
 #include "sim/sim_clock.hpp"
 #include "tests/sim/room.hpp"
@@ -45,7 +45,7 @@ struct Yard {
   boost::asio::io_context io;
   sim::SimClock clock{io};
   sim::World world{yard_with_crate(), {}};
-  sim::Robot robot{world, clock};
+  direct::Robot robot{world, clock};
   sim::CanWire wire{clock};
   sim::UnitFaults left_faults{clock}, right_faults{clock};
 

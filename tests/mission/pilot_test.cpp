@@ -7,7 +7,7 @@
 #include <boost/asio/detached.hpp>
 #include <boost/asio/io_context.hpp>
 
-#include "sim/devices.hpp"
+#include "tests/support/direct_devices.hpp"
 #include "sim/sim_clock.hpp"
 #include "tests/sim/room.hpp"
 
@@ -36,7 +36,7 @@ TEST(Pilot, CountsTheFixesItRefusesAndDoesNotFollowThem) {
   sim::SimClock clock(io);
   sim::World world(scene, {});
   ASSERT_TRUE(world.put_robot({{3, 4}, 0.5}, 0));
-  sim::Robot robot(world, clock);
+  direct::Robot robot(world, clock);
   MultipathGnss gnss(robot.gnss);
   hal::Devices real = robot.devices();
   hal::Devices devices{real.drive, real.imu, gnss, real.scanner, real.placement};

@@ -1,0 +1,80 @@
+// The drivers of a robot, as its file names them, on links that somebody else opens. Like main.cpp
+// it may know everything.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "drivers/device.hpp"
+#include "drivers/power_io.hpp"
+#include "drivers/sick_lms_startup.hpp"
+#include "drivers/site_frame.hpp"
+#include "drivers/sweep_scanner.hpp"
+#include "hal/clock.hpp"
+#include "hal/devices.hpp"
+#include "mission/config.hpp"
+
+namespace mission {
+
+// One device of the robot file.
+struct NamedDevice {
+  std::string role;  // The table of the robot file: "drive", "scanner".
+  std::string link;  // As written there.
+  drivers::Device* device{};
+};
+
+// What is wrong with the robot file that only the drivers can tell: settings that no such device
+// has. Empty: nothing.
+std::vector<ConfigError> robot_problems(const MissionConfig& config);
+
+class RobotDrivers {
+ public:
+  struct Links {
+    hal::CanBus* drive{};
+    hal::ByteStream *scanner{}, *pan{}, *imu{}, *gnss{};
+    drivers::PowerIo::Links power;  // Null where the robot has none.
+  };
+
+  // The configuration must have no problems; clock and links must outlive it.
+  RobotDrivers(const RobotConfig& config, const drivers::GeoAnchor& anchor, hal::Clock& clock,
+               const Links& links);
+  ~RobotDrivers();
+
+  hal::Drive& drive() { return *drive_; }
+  hal::Imu& imu() { return *imu_; }
+  hal::Gnss& gnss() { return *gnss_; }
+  hal::Scanner& scanner() { return *sweep_; }
+  drivers::SweepScanner& sweep() { return *sweep_; }
+
+  const std::vector<NamedDevice>& devices() const { return devices_; }
+
+  // All loops. Ends only by cancellation.
+  hal::Task<void> run();
+  // Ends when every device runs; fails with errc::timed_out when one does not after that long:
+  // not_running() says which, and why.
+  hal::Task<hal::Result<void>> started(hal::Duration patience);
+  std::string not_running() const;
+
+ private:
+  void add_drive(const RobotConfig& config, const Links& links);
+  void add_scanner(const RobotConfig& config, const Links& links);
+  void add_gnss(const RobotConfig& config, const drivers::GeoAnchor& anchor, const Links& links);
+  void add_power(const RobotConfig& config, const Links& links);
+  template <class T>
+  T& own(std::string role, std::string link, std::unique_ptr<T> device);
+
+  hal::Clock& clock_;
+  std::vector<std::unique_ptr<drivers::Device>> owned_;
+  std::vector<NamedDevice> devices_;
+  hal::Drive* drive_{};
+  hal::Imu* imu_{};
+  hal::Gnss* gnss_{};
+  std::unique_ptr<drivers::SweepScanner> sweep_;
+};
+
+// How the profile scanner hangs on the pan axis, as the robot file says; and what it is set to.
+drivers::SweepMount mount_of(const ScannerConfig& scanner);
+drivers::LmsSettings lms_settings(const ScannerConfig& scanner);
+
+}  // namespace mission

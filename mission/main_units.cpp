@@ -1,0 +1,173 @@
+#include "mission/main_units.hpp"
+
+#include <numbers>
+
+#include "hal/together.hpp"
+
+namespace mission {
+namespace {
+
+constexpr double kArcsecPerStep = 46.2857;  // A PTU-E46-70 in half steps.
+constexpr double kShortRangeMax_m = 65;     // What an LMS5xx can tell in millimetres.
+
+constexpr double radians(double degrees) {
+  return degrees * std::numbers::pi / 180;
+}
+
+drivers::agilex::Limits limits_of(const std::string& device) {
+  return device == "agilex-scout2" ? drivers::agilex::kScout2 : drivers::agilex::kScoutMini;
+}
+
+sim::Cia402NodeConfig node_config(int node, double units_per_mps, double counts_per_m) {
+  sim::Cia402NodeConfig config;
+  config.node = static_cast<std::uint8_t>(node);
+  config.units_per_mps = units_per_mps;
+  config.counts_per_m = counts_per_m;
+  return config;
+}
+
+}  // namespace
+
+RobotUnits::RobotUnits(const RobotConfig& config, const drivers::GeoAnchor& anchor,
+                       std::uint64_t seed, int threads, sim::World& world, hal::Clock& clock,
+                       const UnitLinks& links)
+    : seed_(seed), world_(world), clock_(clock), supply_(sim::BatteryConfig{}, world) {
+  if (links.drive) add_drive(config, links);
+  if (links.scanner && links.pan) add_scanner(config, threads, links);
+  if (links.imu)
+    imu_.emplace(sim::Vn100UnitConfig{}, world_, clock_, *links.imu, add_faults("imu"));
+  if (links.gnss) add_gnss(config, anchor, links);
+  add_power(config.power);
+}
+
+RobotUnits::~RobotUnits() = default;
+
+// Each with a seed of its own, in the order in which they are made.
+sim::UnitFaults& RobotUnits::add_faults(std::string role) {
+  const std::uint64_t seed = seed_ * 64 + faults_.size();
+  return *faults_.emplace_back(std::move(role), std::make_unique<sim::UnitFaults>(clock_, seed))
+              .faults;
+}
+
+sim::UnitFaults* RobotUnits::faults(std::string_view role) {
+  for (const Faulty& faulty : faults_)
+    if (faulty.role == role) return faulty.faults.get();
+  return nullptr;
+}
+
+void RobotUnits::add_drive(const RobotConfig& config, const UnitLinks& links) {
+  const DriveConfig& drive = config.drive;
+  sim::UnitFaults& faults = add_faults("drive");
+  if (drive.device == "cia402") {
+    cia402_.emplace(
+        node_config(drive.left_node, drive.left_units_per_mps, drive.left_counts_per_m),
+        node_config(drive.right_node, drive.right_units_per_mps, drive.right_counts_per_m), world_,
+        clock_, *links.drive, *links.second_drive, faults, add_faults("drive2"));
+    return;
+  }
+  sim::AgilexUnit::Config agilex;
+  agilex.limits = limits_of(drive.device);
+  agilex_.emplace(agilex, world_, &supply_, clock_, *links.drive, faults);
+}
+
+void RobotUnits::add_scanner(const RobotConfig& config, int threads, const UnitLinks& links) {
+  sim::FlirPtuUnitConfig ptu;
+  ptu.arcsec_per_step = kArcsecPerStep;
+  ptu.counter_clockwise = config.pan.counter_clockwise;
+  ptu.angle_max_rad = radians(config.pan.angle_max_deg);
+  ptu.reset_time = {};  // It was on before the computer was.
+  ptu.seed = seed_;
+  ptu_.emplace(ptu, clock_, *links.pan, add_faults("pan"));
+  sim::SickLmsUnitConfig lms;
+  lms.lms5xx = config.scanner.device == "sick-lms5xx";
+  lms.long_range = lms.lms5xx && config.scanner.range_max_m > kShortRangeMax_m;
+  lms.T_P_L = mount_of(config.scanner).T_P_L();
+  lms.ranges = world_.config().scanner;
+  lms.seed = seed_;
+  lms.threads = threads;
+  lms_.emplace(lms, world_, clock_, *links.scanner, add_faults("scanner"), *ptu_);
+}
+
+void RobotUnits::add_gnss(const RobotConfig& config, const drivers::GeoAnchor& anchor,
+                          const UnitLinks& links) {
+  sim::GnssSourceConfig source;
+  source.anchor = anchor;
+  sim::UnitFaults& faults = add_faults("gnss");
+  if (config.gnss.device == "nmea") {
+    sim::NmeaUnitConfig nmea;
+    nmea.source = source;
+    nmea_.emplace(nmea, world_, clock_, *links.gnss, faults);
+  } else if (config.gnss.device == "gpsd") {
+    sim::GpsdUnitConfig gpsd;
+    gpsd.source = source;
+    gpsd_.emplace(gpsd, world_, clock_, *links.gnss, faults);
+  } else {
+    sim::UbloxUnitConfig ublox;
+    ublox.source = source;
+    ublox_.emplace(ublox, world_, clock_, *links.gnss, faults);
+  }
+}
+
+void RobotUnits::add_power(const PowerConfig& config) {
+  if (!config.battery_link.empty())
+    victron_.emplace(sim::VictronUnit::Config{}, supply_, clock_, add_faults("battery"));
+  if (!config.board_link.empty()) board_.emplace(clock_, add_faults("board"));
+  if (!config.safety_link.empty()) pilz_.emplace(add_faults("safety"));
+}
+
+hal::Task<void> RobotUnits::run() {
+  std::vector<hal::Task<void>> loops;
+  const auto add = [&](auto& unit) {
+    if (unit) loops.push_back(unit->run());
+  };
+  add(agilex_);
+  add(cia402_);
+  add(ptu_);
+  add(lms_);
+  add(imu_);
+  add(ublox_);
+  add(nmea_);
+  add(gpsd_);
+  add(board_);
+  co_await hal::together(std::move(loops));
+}
+
+SimulatedRobot::SimulatedRobot(const RobotConfig& config, const drivers::GeoAnchor& anchor,
+                               std::uint64_t seed, int threads, sim::World& world,
+                               hal::Clock& clock)
+    : can_(clock), scanner_(clock), pan_(clock), imu_(clock), gnss_(clock) {
+  hal::CanBus& drivers_end = can_.attach();
+  const UnitLinks ends{.drive = &can_.attach(),
+                       .second_drive = config.drive.device == "cia402" ? &can_.attach() : nullptr,
+                       .scanner = &scanner_.b(),
+                       .pan = &pan_.b(),
+                       .imu = &imu_.b(),
+                       .gnss = &gnss_.b()};
+  units_ = std::make_unique<RobotUnits>(config, anchor, seed, threads, world, clock, ends);
+  const auto registers = [&](sim::RegisterUnit* unit) -> hal::Registers* {
+    if (!unit) return nullptr;
+    return &registers_.emplace_back(std::make_unique<sim::RegisterWire>(clock, *unit))->client();
+  };
+  drivers_ = std::make_unique<RobotDrivers>(
+      config, anchor, clock,
+      RobotDrivers::Links{.drive = &drivers_end,
+                          .scanner = &scanner_.a(),
+                          .pan = &pan_.a(),
+                          .imu = &imu_.a(),
+                          .gnss = &gnss_.a(),
+                          .power = {.battery = registers(units_->battery()),
+                                    .gateway = nullptr,
+                                    .board = registers(units_->board()),
+                                    .safety = registers(units_->safety())}});
+}
+
+SimulatedRobot::~SimulatedRobot() = default;
+
+hal::Task<void> SimulatedRobot::run() {
+  std::vector<hal::Task<void>> both;
+  both.push_back(units_->run());
+  both.push_back(drivers_->run());
+  co_await hal::together(std::move(both));
+}
+
+}  // namespace mission
