@@ -1,4 +1,7 @@
 #include <boost/asio/experimental/awaitable_operators.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/this_coro.hpp>
+#include <boost/asio/use_awaitable.hpp>
 #include <deque>
 
 #include "sim/inbox.hpp"
@@ -28,6 +31,7 @@ struct CanWire::Bus {
       : clock(its_clock), config(its_config), disturbance(config.seed) {}
 
   bool acknowledged(const Plug& from) const;
+  bool crowded() const;
   void deliver(const Plug& from, CanFrame frame);
 
   hal::Clock& clock;
@@ -59,6 +63,10 @@ class CanWire::Bus::Plug final : public CanWire::End {
     if (sent > bus_.clock.now()) co_await bus_.clock.sleep_until(sent);
     if (!inbox_.connected()) co_return error(errc::network_down);
     bus_.deliver(*this, frame);
+    // Frames that take no time: whoever receives must have its turn before its inbox is full.
+    if (bus_.crowded())
+      co_await boost::asio::post(co_await boost::asio::this_coro::executor,
+                                 boost::asio::use_awaitable);
     co_return hal::Result<void>{};
   }
 
@@ -79,6 +87,7 @@ class CanWire::Bus::Plug final : public CanWire::End {
   std::uint64_t lost_frames() const override { return lost_; }
 
   bool connected() const { return inbox_.connected(); }
+  bool half_full() const { return 2 * inbox_.room() < bus_.config.inbox_frames; }
   void expect_overtaking(bool may) { inbox_.expect_overtaking(may); }
   void put(hal::Time due, const CanFrame& frame) {
     if (connected() && !inbox_.put(due, frame)) ++lost_;
@@ -95,6 +104,10 @@ bool CanWire::Bus::acknowledged(const Plug& from) const {
   return from.connected() && std::any_of(plugs.begin(), plugs.end(), [&](const Plug& plug) {
            return &plug != &from && plug.connected();
          });
+}
+
+bool CanWire::Bus::crowded() const {
+  return std::any_of(plugs.begin(), plugs.end(), [](const Plug& plug) { return plug.half_full(); });
 }
 
 void CanWire::Bus::deliver(const Plug& from, CanFrame frame) {

@@ -19,7 +19,7 @@ struct LinkFaults {
   std::size_t chunk_max{};  // Streams arrive in pieces of 1 to so many bytes; 0: as written.
   // After so many more bytes of a stream (both ways together), frames, datagrams or requests the
   // wire is cut, until it is mended. Counts down from when the faults are set.
-  std::optional<std::uint64_t> cut_after;
+  std::optional<std::uint64_t> cut_after{};
 
   static constexpr hal::Duration kHeldBack = std::chrono::milliseconds(10);
 };

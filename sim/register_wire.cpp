@@ -1,6 +1,7 @@
 #include <map>
 #include <tuple>
-#include <variant>
+#include <type_traits>
+#include <vector>
 
 #include "drivers/modbus_errors.hpp"
 #include "hal/wake.hpp"
@@ -15,6 +16,9 @@ using Words = std::vector<std::uint16_t>;
 using Bits = std::vector<bool>;
 
 namespace {
+
+// As many as the protocol can carry.
+constexpr std::uint16_t kWordsMax = 125, kBitsMax = 2000;
 
 hal::Result<void> refused() {
   return error(errc::function_not_supported);
@@ -139,6 +143,8 @@ template <class Values>
 hal::Task<hal::Result<Values>> RegisterWire::Bus::read(int function, Range range,
                                                        Reader<Values> reader,
                                                        Stuck<Values>& stuck) {
+  constexpr std::uint16_t kMost = std::is_same_v<Values, Bits> ? kBitsMax : kWordsMax;
+  if (range.count == 0 || range.count > kMost) co_return error(errc::invalid_argument);
   auto reply = co_await exchange([this, range, reader] { return (unit.*reader)(range); });
   forget_stuck_replies();
   if (reply && unit.faults() != nullptr && unit.faults()->is(UnitFault::stuck))
