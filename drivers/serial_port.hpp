@@ -1,0 +1,47 @@
+// A serial port: 8 data bits, raw, for us alone; opened again whenever it was unplugged.
+#pragma once
+
+#include <boost/asio/any_io_executor.hpp>
+#include <memory>
+#include <optional>
+
+#include "drivers/link_address.hpp"
+#include "drivers/link_trouble.hpp"
+#include "hal/clock.hpp"
+#include "hal/links.hpp"
+
+namespace drivers {
+
+// What the kernel counted at a port since its driver was loaded.
+struct SerialErrors {
+  std::uint32_t framing{}, parity{}, breaks{}, overruns{};
+};
+
+// Several may write, in turns; one reads.
+class SerialPort final : public hal::ByteStream, public Link {
+ public:
+  // Begins to open at once. `clock` must outlive the event loop's last turn.
+  SerialPort(SerialLine line, const boost::asio::any_io_executor& executor, hal::Clock& clock);
+  ~SerialPort() override;
+
+  hal::Task<hal::Result<void>> write(std::span<const std::uint8_t> bytes) override;
+  hal::Task<hal::Result<std::size_t>> read_some(std::span<std::uint8_t> into) override;
+
+  std::string address() const override { return to_text(LinkAddress(SerialAddress{line_})); }
+  std::vector<Trouble> troubles() const override;
+  bool connected() const;
+  // Nothing while lost, and for ports that do not count (pseudo terminals, some USB adapters).
+  std::optional<SerialErrors> errors() const;
+
+ private:
+  struct State;
+  SerialLine line_;
+  std::shared_ptr<State> state_;
+};
+
+// Applies the line's settings to an open port and reads them back.
+boost::system::error_code apply_settings(int port, const SerialLine& line);
+// So that nobody else opens it or talks in between; ends when it is closed.
+boost::system::error_code lock_port(int port);
+
+}  // namespace drivers
