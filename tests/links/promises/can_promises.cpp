@@ -5,7 +5,7 @@ namespace {
 
 namespace errc = boost::system::errc;
 
-constexpr std::uint32_t kProbe = 0x7F0;
+constexpr std::uint32_t kProbe = 0x7E5;
 
 hal::Time in(CanRig& rig, hal::Duration span) {
   return rig.loop().clock().now() + span;
