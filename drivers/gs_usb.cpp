@@ -71,13 +71,14 @@ class LibusbPipe final : public UsbPipe {
  public:
   LibusbPipe(std::shared_ptr<UsbEvents> events, libusb_device_handle* handle, std::string name)
       : events_(std::move(events)), handle_(handle), name_(std::move(name)) {}
-  ~LibusbPipe() override;
+  ~LibusbPipe() override { close(); }
   LibusbPipe(const LibusbPipe&) = delete;
   LibusbPipe& operator=(const LibusbPipe&) = delete;
 
   error_code claim();
 
   std::string name() const override { return name_; }
+  void close() override;
   hal::Task<hal::Result<void>> put(Request request, std::uint16_t value, Bytes data) override;
   hal::Task<hal::Result<Bytes>> get(Request request, std::uint16_t value,
                                     std::size_t size) override;
@@ -92,7 +93,7 @@ class LibusbPipe final : public UsbPipe {
   error_code start_read(const std::shared_ptr<Transfer>& transfer);
 
   std::shared_ptr<UsbEvents> events_;
-  libusb_device_handle* handle_;
+  libusb_device_handle* handle_;  // Null when it was given back.
   std::string name_;
   Endpoints endpoints_;
   std::set<std::shared_ptr<Transfer>> transfers_;  // Whatever may be under way.
@@ -124,7 +125,8 @@ void LibusbPipe::find_endpoints() {
 }
 
 // libusb must have given back every transfer before the handle goes.
-LibusbPipe::~LibusbPipe() {
+void LibusbPipe::close() {
+  if (handle_ == nullptr) return;
   const auto any_under_way = [this] {
     return std::any_of(transfers_.begin(), transfers_.end(),
                        [](const auto& transfer) { return transfer->under_way(); });
@@ -136,15 +138,18 @@ LibusbPipe::~LibusbPipe() {
   }
   for (const auto& transfer : transfers_) transfer->forget();
   libusb_release_interface(handle_, kInterface);
-  libusb_close(handle_);
+  libusb_close(std::exchange(handle_, nullptr));
+  arrived_.clear();
+  changed_.drop();
 }
 
 hal::Task<error_code> LibusbPipe::perform(std::shared_ptr<Transfer> transfer) {
+  if (handle_ == nullptr) co_return errc::make_error_code(errc::no_such_device);
   struct Listed {
     LibusbPipe& pipe;
     std::shared_ptr<Transfer> transfer;
     ~Listed() {
-      transfer->cancel();  // Where the caller was.
+      if (pipe.handle_ != nullptr) transfer->cancel();  // Where the caller was.
       if (!transfer->under_way()) pipe.transfers_.erase(transfer);
     }
   } const listed{*this, transfer};
@@ -203,6 +208,7 @@ error_code LibusbPipe::start_read(const std::shared_ptr<Transfer>& transfer) {
 }
 
 hal::Task<hal::Result<Bytes>> LibusbPipe::read() {
+  if (handle_ == nullptr) co_return errc::make_error_code(errc::no_such_device);
   if (!std::exchange(reading_, true))
     for (std::size_t i = 0; i < kReads; ++i)
       if (const error_code error = start_read(std::make_shared<Transfer>())) co_return error;

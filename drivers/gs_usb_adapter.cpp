@@ -41,7 +41,8 @@ struct GsUsbAdapter::State : std::enable_shared_from_this<State> {
   asio::cancellation_signal stop;
   hal::Wake changed;  // Found, lost, confirmed, received, bus off, restarted.
   hal::Wake look_again;
-  std::shared_ptr<UsbPipe> pipe;  // Null while there is no running adapter.
+  std::shared_ptr<UsbPipe> opened;  // Running or being started.
+  std::shared_ptr<UsbPipe> pipe;    // Null while there is no running adapter.
   std::optional<Trouble> trouble;
   std::deque<AChannel> channels;
 };
@@ -126,6 +127,7 @@ hal::Task<void> GsUsbAdapter::State::keep(std::shared_ptr<State> self) {
       self->trouble = std::move(*why);
     } else {
       const auto pipe = std::get<std::shared_ptr<UsbPipe>>(std::move(opened));
+      self->opened = pipe;
       self->trouble = co_await self->start(pipe);
       if (!self->trouble) {
         pause.reset();
@@ -135,6 +137,7 @@ hal::Task<void> GsUsbAdapter::State::keep(std::shared_ptr<State> self) {
         self->lose(drivers::trouble(LinkFault::lost, pipe->name()));
       }
     }
+    self->opened.reset();
     co_await (self->clock.sleep_for(pause.next()) || self->look_again.wait());
   }
 }
@@ -374,6 +377,10 @@ GsUsbAdapter::GsUsbAdapter(Open open, const asio::any_io_executor& executor, hal
 
 GsUsbAdapter::~GsUsbAdapter() {
   state_->stop.emit(asio::cancellation_type::terminal);
+  // Who waits holds the state and the pipe, and they them: nobody else would let go.
+  if (const auto pipe = state_->opened) pipe->close();
+  state_->changed.drop();
+  state_->look_again.drop();
 }
 
 GsUsbAdapter::Channel& GsUsbAdapter::channel(std::uint8_t number, std::uint32_t bit_rate_bps,

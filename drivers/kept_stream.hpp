@@ -80,6 +80,7 @@ class KeptStream {
   void stop() {
     stop_.emit(boost::asio::cancellation_type::terminal);
     drop();
+    changed_.drop();  // Who waits holds us, and we them: nobody else would let go.
   }
   // Lost by our own will; it is opened again.
   void drop() { lose(stream_, boost::asio::error::operation_aborted); }

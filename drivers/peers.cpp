@@ -72,6 +72,7 @@ TcpPeer::TcpPeer(const std::string& address, std::uint16_t port,
 }
 TcpPeer::~TcpPeer() {
   state_->stop();
+  state_->plugged.drop();
 }
 
 hal::Task<hal::Result<void>> TcpPeer::write(std::span<const std::uint8_t> bytes) {
@@ -148,6 +149,7 @@ PtyPeer::PtyPeer(std::string path, const asio::any_io_executor& executor, hal::C
 PtyPeer::~PtyPeer() {
   state_->pull();
   state_->stop();
+  state_->plugged.drop();
 }
 
 hal::Task<hal::Result<void>> PtyPeer::write(std::span<const std::uint8_t> bytes) {

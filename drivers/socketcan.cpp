@@ -392,6 +392,7 @@ SocketCan::~SocketCan() {
   state_->stop_following.emit(asio::cancellation_type::terminal);
   state_->stop_pumping.emit(asio::cancellation_type::terminal);
   state_->lose();
+  state_->changed.drop();  // Who waits holds the state, and the state them.
 }
 
 std::vector<Trouble> SocketCan::troubles() const {

@@ -21,6 +21,8 @@ class UsbPipe {
   virtual hal::Task<hal::Result<Bytes>> get(gs_usb::Request request, std::uint16_t value,
                                             std::size_t size) = 0;
   virtual hal::Task<hal::Result<void>> write(Bytes frame) = 0;
+  // Gives the adapter back, and unwinds all who wait here.
+  virtual void close() = 0;
   // The next transfer from the adapter. One coroutine reads.
   virtual hal::Task<hal::Result<Bytes>> read() = 0;
 };

@@ -53,7 +53,7 @@ Task<void> Wake::wait() {
       [&](auto handler) { enlist(waiter, std::move(handler)); }, boost::asio::use_awaitable);
 }
 
-Wake::~Wake() {
+void Wake::drop() {
   while (!waiters_.empty()) {
     Waiter* const last = waiters_.back();
     waiters_.pop_back();

@@ -12,13 +12,16 @@ namespace hal {
 class Wake {
  public:
   Wake() = default;
-  ~Wake();
+  ~Wake() { drop(); }
   Wake(const Wake&) = delete;
   Wake& operator=(const Wake&) = delete;
 
   // Until the next notify(); look again then at what you wait for. Throws
   // boost::system::system_error(operation_aborted) when cancelled.
   Task<void> wait();
+
+  // Unwinds all who wait now, as destroying it does: for owners that live on in what they own.
+  void drop();
 
   // Wakes all who wait now, in the order in which they came, after what is ready now.
   void notify();

@@ -97,6 +97,7 @@ class FakeGsUsb::Pipe final : public drivers::UsbPipe {
   explicit Pipe(std::shared_ptr<State> state) : state_(std::move(state)), plug_(state_->plugs) {}
 
   std::string name() const override { return "fake adapter"; }
+  void close() override { state_->changed.drop(); }
 
   hal::Task<hal::Result<void>> put(Request request, std::uint16_t value, Bytes data) override {
     if (const auto problem = state_->problem(plug_)) co_return *problem;
@@ -138,6 +139,9 @@ class FakeGsUsb::Pipe final : public drivers::UsbPipe {
 };
 
 FakeGsUsb::FakeGsUsb() : state_(std::make_shared<State>()) {}
+FakeGsUsb::~FakeGsUsb() {
+  state_->changed.drop();
+}
 
 drivers::GsUsbAdapter::Open FakeGsUsb::open() {
   return [state = state_]() -> hal::Task<drivers::GsUsbAdapter::Opened> {

@@ -17,6 +17,9 @@ class FakeGsUsb {
   static constexpr std::uint8_t kChannels = 2;
 
   FakeGsUsb();
+  ~FakeGsUsb();
+  FakeGsUsb(const FakeGsUsb&) = delete;
+  FakeGsUsb& operator=(const FakeGsUsb&) = delete;
 
   drivers::GsUsbAdapter::Open open();
   void unplug();

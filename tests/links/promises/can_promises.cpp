@@ -33,11 +33,11 @@ hal::Task<hal::CanFrame> next(hal::CanBus& bus) {
 }
 
 hal::Task<bool> probe(CanRig& rig, hal::CanBus& from, hal::CanBus& to) {
-  if (!co_await from.send({kProbe, 0}, in(rig, 100ms))) {
+  if (!co_await from.send({kProbe, 0}, in(rig, 1s))) {
     co_await rig.loop().clock().sleep_for(20ms);
     co_return false;
   }
-  const auto heard = co_await patiently(rig.loop(), 200ms, to.receive());
+  const auto heard = co_await patiently(rig.loop(), 1s, to.receive());
   co_return heard && heard->has_value();
 }
 
@@ -50,10 +50,10 @@ hal::Task<void> drain(CanRig& rig, hal::CanBus& bus) {
 
 // Until frames go both ways; losses may be told in the meantime. Leaves nothing unread.
 hal::Task<void> up(CanRig& rig) {
-  const hal::Time late = in(rig, 20s);
+  const hal::Time late = in(rig, 60s);
   bool there = false, back = false;
   while (!there || !back) {
-    require(rig.loop().clock().now() < late, "it does not come up within 20 s");
+    require(rig.loop().clock().now() < late, "it does not come up within a minute");
     if (!there)
       there = co_await probe(rig, rig.a(), rig.b());
     else
