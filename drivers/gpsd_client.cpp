@@ -19,7 +19,7 @@ constexpr hal::Duration kPause = 500ms;
 constexpr hal::Duration kGiveUp = 5s;
 constexpr std::string_view kAskVersion = "?VERSION;\r\n";
 constexpr int kProtocolMajor = 3;
-constexpr int kReportsOfEpoch = 4;  // One for each sentence that says more, at most.
+constexpr int kReportsOfInstant = 12;  // One for each sentence of the receiver, at most.
 
 constexpr Fault kOtherProtocol{1, "gpsd of another protocol", "its release is too old or too new",
                                "install gpsd 3.x"};
@@ -132,6 +132,8 @@ void GpsdClient::judge_devices() {
 
 hal::Task<void> GpsdClient::listen() {
   output_.restart(clock_.now(), reader_);
+  pending_.reset();
+  report_time_.clear();
   state_ = DeviceState::running;
   was_running_ = true;
   co_await (read_reports() || watch());
@@ -158,20 +160,37 @@ void GpsdClient::handle(const GpsdMessage& message) {
     if (!config_.device.empty() && tpv->device != config_.device) return;
     output_.troubles().clear(fault::kGone);
     output_.troubles().clear(kNoReceiver);
-    if (is_usual_repeat(tpv->time)) return;
-    GnssEpoch epoch = epoch_of(*tpv);
-    // Of gpsd, a circle of 95 %; one sigma of each axis is this much less.
-    if (epoch.horizontal_accuracy_m) *epoch.horizontal_accuracy_m *= std::sqrt(2.0) / 2.4477;
-    output_.add(epoch, reader_.arrival());
+    take(*tpv);
   }
 }
 
-// The first report of an epoch is used; a few more of it are usual. Without a time none is known.
-bool GpsdClient::is_usual_repeat(const std::string& time) {
-  const bool again = !time.empty() && time == report_time_;
-  report_times_ = again ? report_times_ + 1 : 1;
-  report_time_ = time;
-  return again && report_times_ <= kReportsOfEpoch;
+// gpsd reports an instant once for each sentence that says more of it: the first that states an
+// accuracy is used; where none does, the last.
+void GpsdClient::take(const GpsdTpv& tpv) {
+  GnssEpoch epoch = epoch_of(tpv);
+  // Of gpsd, a circle of 95 %; the radius of 68 % that others state is this much smaller.
+  if (epoch.horizontal_accuracy_m) *epoch.horizontal_accuracy_m *= std::sqrt(2.0) / 2.4477;
+  if (tpv.time.empty() || tpv.time != report_time_) {
+    // A report without a time comes before the receiver's date: the same instant follows with it.
+    if (report_time_.empty() && !tpv.time.empty()) pending_.reset();
+    give_pending();
+    report_time_ = tpv.time;
+    reports_ = 0;
+    given_ = false;
+  }
+  if (++reports_ > kReportsOfInstant) output_.repeated();
+  if (given_) return;
+  pending_ = epoch;
+  pending_at_ = reader_.arrival();
+  const bool accurate = epoch.horizontal_accuracy_m || (epoch.sigma_east_m && epoch.sigma_north_m);
+  if (!epoch.usable() || (accurate && !tpv.time.empty())) give_pending();
+}
+
+void GpsdClient::give_pending() {
+  if (!pending_) return;
+  output_.add(*pending_, pending_at_);
+  pending_.reset();
+  given_ = true;
 }
 
 hal::Task<void> GpsdClient::watch() {

@@ -40,7 +40,8 @@ class GpsdClient final : public hal::Gnss, public Device {
   void name_silence();
   void judge_devices();
   void handle(const GpsdMessage& message);
-  bool is_usual_repeat(const std::string& time);
+  void take(const GpsdTpv& tpv);
+  void give_pending();
 
   GpsdClientConfig config_;
   hal::Clock& clock_;
@@ -51,8 +52,11 @@ class GpsdClient final : public hal::Gnss, public Device {
   std::vector<GpsdDevice> devices_;
   DeviceState state_ = DeviceState::off;
   bool was_running_ = false;
-  std::string report_time_;  // Of the last report, and how often it came.
-  int report_times_ = 0;
+  std::string report_time_;  // Of the last report, how often it came, and whether it was used.
+  int reports_ = 0;
+  bool given_ = false;
+  std::optional<GnssEpoch> pending_;
+  hal::Time pending_at_{};
 };
 
 }  // namespace drivers
