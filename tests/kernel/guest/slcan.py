@@ -1,29 +1,32 @@
-"""An slcan adapter on a pty, whose name it writes to /tmp/slcan.tty. A frame comes back with its id raised by 0x100;
-what else it was told goes to /tmp/slcan.told. A line in /tmp/slcan.say is sent as it is."""
+"""Two slcan adapters on one bus, each on a pty whose name it writes to /tmp/slcan.N. What one is told besides frames
+goes to /tmp/slcan.told. A line in /tmp/slcan.say is sent by the first as it is."""
 import os
 import pty
 import select
 import tty
 
-master, slave = pty.openpty()
-tty.setraw(master)
-tty.setraw(slave)
-with open('/tmp/slcan.tty', 'w') as name:
-    name.write(os.ttyname(slave))
-waiting = b''
+masters = []
+for number in range(2):
+    master, slave = pty.openpty()
+    tty.setraw(master)
+    tty.setraw(slave)
+    masters.append(master)
+    with open('/tmp/slcan.%d' % number, 'w') as name:
+        name.write(os.ttyname(slave))
+waiting = {master: b'' for master in masters}
 while True:
-    ready, _, _ = select.select([master], [], [], 0.1)
+    ready, _, _ = select.select(masters, [], [], 0.1)
     if os.path.exists('/tmp/slcan.say'):
         with open('/tmp/slcan.say', 'rb') as say:
-            os.write(master, say.read().strip() + b'\r')
+            os.write(masters[0], say.read().strip() + b'\r')
         os.remove('/tmp/slcan.say')
-    if not ready:
-        continue
-    waiting += os.read(master, 4096)
-    *lines, waiting = waiting.split(b'\r')
-    for line in lines:
-        if line.startswith(b't') and len(line) >= 5:
-            os.write(master, b't%03x%s\r' % ((int(line[1:4], 16) + 0x100) & 0x7ff, line[4:]))
-        else:
-            with open('/tmp/slcan.told', 'ab') as told:
-                told.write(line + b'\n')
+    for master in ready:
+        other = masters[1 - masters.index(master)]
+        waiting[master] += os.read(master, 4096)
+        *lines, waiting[master] = waiting[master].split(b'\r')
+        for line in lines:
+            if line[:1] in (b't', b'T', b'r', b'R'):
+                os.write(other, line + b'\r')
+            else:
+                with open('/tmp/slcan.told', 'ab') as told:
+                    told.write(line + b'\n')
