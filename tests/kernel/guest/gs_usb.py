@@ -1,4 +1,4 @@
-"""A gs_usb adapter (candleLight) with two channels on one bus. Frame 7F0 drives its channel off the bus."""
+"""A gs_usb adapter (candleLight) with two channels on one bus. Frame 7F0#0FF0 drives its channel off the bus."""
 import struct
 
 from adapter import Adapter
@@ -32,7 +32,7 @@ class GsUsb(Adapter):
 
     def take(self, out):
         _, can_id, size, channel, _, _, data = struct.unpack('<IIBBBB8s', out[:20])
-        if can_id == 0x7f0:
+        if can_id == 0x7f0 and data[:size] == b'\x0f\xf0':
             self.received(channel, 0x20000204, b'\0\x08\0\0\0\0\x60\0')
             self.received(channel, 0x20000204, b'\0\x20\0\0\0\0\x80\0')
             self.received(channel, 0x20000040, bytes(8))

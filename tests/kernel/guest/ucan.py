@@ -1,5 +1,5 @@
 """A ucan adapter (driver ucan.c: bus-off with restart). Every frame is acknowledged and comes back with id ^ 0x400.
-Frame 7F0 drives the bus off: warning, passive, off, and is never sent. While "hold" lies in /tmp nothing is
+Frame 7F0#0FF0 drives the bus off: warning, passive, off, and is never sent. While "hold" lies in /tmp nothing is
 acknowledged, as on a bus without another node."""
 import os
 import struct
@@ -28,7 +28,7 @@ class Ucan(Adapter):
         data = out[8:length]
         if os.path.exists('/tmp/hold'):
             return
-        if can_id == 0x7f0:
+        if can_id == 0x7f0 and data == b'\x0f\xf0':
             self.received(0x20000004, b'\0\x08\0\0\0\0\x60\0')
             self.received(0x20000004, b'\0\x20\0\0\0\0\x80\0')
             self.received(0x20000040, bytes(8))
