@@ -26,9 +26,6 @@ constexpr double kGroundSampleM = 4.0;
 // Ways are looked for in steps of this: a gap that leaves the robot this much play is a way.
 constexpr double kReachCellM = 0.25;
 
-// Where simulated sites lie on the earth: somewhere, as long as all agree.
-constexpr drivers::GeoAnchor kAnchor{48.0, 11.0, 500, 0};
-
 sim::ScannerModel scanner_model(const RobotConfig& robot) {
   const ScannerConfig& scanner = robot.scanner;
   return {.height_m = scanner.height_m,
@@ -130,26 +127,28 @@ void complete_ground(SimSite& site, const nav::SiteMap& map, const std::vector<A
                     report.with_ground, report.samples, report.added_z_m));
 }
 
-SimBackend::SimBackend(const MissionConfig& config, const SiteTasks& tasks, SimSite site,
-                       int threads)
-    : config_(config),
-      threads_(threads),
-      site_(std::move(site)),
+SimWorld::SimWorld(const MissionConfig& config, const SiteTasks& tasks, SimSite site, int threads)
+    : site_(std::move(site)),
       scene_(site_.mesh),
-      world_(scene_, world_config(config, tasks, threads)),
-      robot_(config.robot, kAnchor, config.seed, threads, world_, clock_),
-      scanner_(robot_.drivers().scanner(), world_, clock_),
-      placement_(world_, clock_),
-      devices_{robot_.drivers().drive(), robot_.drivers().imu(), robot_.drivers().gnss(), scanner_,
-               placement_} {
+      world_(scene_, world_config(config, tasks, threads)) {
   if (tasks.start_area < 0) return;
   if (!world_.put_robot(tasks.start, start_ground_z_m(tasks)))
     throw std::runtime_error(fmt::format(
         "the robot cannot stand at its start ({:.2f}, {:.2f}): the model has something there, or "
-        "no "
-        "ground near {:.2f} m; move the map's `start`",
+        "no ground near {:.2f} m; move the map's `start`",
         tasks.start.position_m.x(), tasks.start.position_m.y(), start_ground_z_m(tasks)));
 }
+
+SimBackend::SimBackend(const MissionConfig& config, const SiteTasks& tasks, SimSite site,
+                       int threads)
+    : config_(config),
+      threads_(threads),
+      true_site_(config, tasks, std::move(site), threads),
+      robot_(config.robot, kSimAnchor, config.seed, threads, true_site_.world(), clock_),
+      scanner_(robot_.drivers().scanner(), true_site_.world(), clock_),
+      placement_(true_site_.world(), clock_),
+      devices_{robot_.drivers().drive(), robot_.drivers().imu(), robot_.drivers().gnss(), scanner_,
+               placement_} {}
 
 bool SimBackend::run(const std::function<bool()>& done) {
   if (!started_)
@@ -184,7 +183,8 @@ Truth SimBackend::judge(RunRecord& record, const SiteModel& model,
 void SimBackend::judge_poses(RunRecord& record, Truth& truth) const {
   double squares_m2 = 0, nees = 0;
   for (ScanRecord& scan : record.scans) {
-    const sim::ScanTruth& at = world_.scans().at(static_cast<std::size_t>(scan.number - 1));
+    const sim::ScanTruth& at =
+        true_site_.world().scans().at(static_cast<std::size_t>(scan.number - 1));
     scan.truth = at.at.pose;
     Eigen::Vector3d error;
     error << scan.believed.position_m - at.at.pose.position_m,
@@ -207,7 +207,9 @@ std::function<bool(const Eigen::Vector2d&)> SimBackend::reachable_ground(
     const RunRecord& record, const AreaTask& task) const {
   const double ground_z_m = task.area.ground_z_m;
   const auto stands = [this, ground_z_m](const Eigen::Vector2d& W_point_m) {
-    return world_.standing({W_point_m, 0}, ground_z_m, config_.robot.body.radius_m).has_value();
+    return true_site_.world()
+        .standing({W_point_m, 0}, ground_z_m, config_.robot.body.radius_m)
+        .has_value();
   };
   std::vector<Eigen::Vector2d> seeds;
   for (const ScanRecord& scan : record.scans)
@@ -253,7 +255,7 @@ void SimBackend::judge_surface(const RunRecord& record, const SiteModel& model,
   const ScannerConfig& scanner = config_.robot.scanner;
   const planning::VoxelGrid& grid = model.map().grid();
   const sim::SurfaceTruth surface = sim::judge_surface(
-      site_.mesh, scene_,
+      true_site_.mesh(), true_site_.scene(),
       {.W_min_m = grid.W_min_m,
        .voxel_m = grid.voxel_m,
        .nx = grid.nx,

@@ -14,8 +14,8 @@
 #include "mission/plan.hpp"
 #include "mission/record.hpp"
 #include "mission/site_model.hpp"
-#include "sim/placement.hpp"
 #include "sim/mesh.hpp"
+#include "sim/placement.hpp"
 #include "sim/scene.hpp"
 #include "sim/sim_clock.hpp"
 #include "sim/witnessed_scanner.hpp"
@@ -38,6 +38,23 @@ void assume_ground(SimSite& site, nav::SiteMap& map);
 
 // Adds a level ground where the model has none under the places where the robot or a person stands.
 void complete_ground(SimSite& site, const nav::SiteMap& map, const std::vector<AreaTask>& tasks);
+
+// The true site, with the robot at its start.
+class SimWorld {
+ public:
+  // Throws std::runtime_error when the robot cannot stand at its start.
+  SimWorld(const MissionConfig& config, const SiteTasks& tasks, SimSite site, int threads);
+
+  const sim::Mesh& mesh() const { return site_.mesh; }
+  const sim::Scene& scene() const { return scene_; }
+  sim::World& world() { return world_; }
+  const sim::World& world() const { return world_; }
+
+ private:
+  SimSite site_;
+  sim::Scene scene_;
+  sim::World world_;
+};
 
 class SimBackend {
  public:
@@ -71,11 +88,9 @@ class SimBackend {
 
   const MissionConfig config_;
   const int threads_;
-  SimSite site_;
-  sim::Scene scene_;
+  SimWorld true_site_;
   boost::asio::io_context io_{1};
   sim::SimClock clock_{io_};
-  sim::World world_;
   SimulatedRobot robot_;
   sim::WitnessedScanner scanner_;
   sim::SimPlacement placement_;

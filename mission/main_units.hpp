@@ -28,6 +28,9 @@
 
 namespace mission {
 
+// Where simulated sites lie on the earth: somewhere, as long as all agree.
+inline constexpr drivers::GeoAnchor kSimAnchor{48.0, 11.0, 500, 0};
+
 // The units' own ends of the links. A link that is null has no unit on it.
 struct UnitLinks {
   // An AgileX base uses the first end of the bus, two CiA 402 drives one each.

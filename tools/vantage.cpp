@@ -15,6 +15,7 @@ int main(int argc, char** argv) {
       "  vantage tour pcb442.tsp --json\n"
       "  vantage keys | less\n"
       "  vantage decode agilex drive.log\n"
+      "  vantage doctor configs/robots/scout_lms511.toml\n"
       "Each command has its own --help, with examples. Every command knows --json.\n"
       "Exit: 0 fine, 1 tried and failed, 2 refused (every reason is on stderr, one a line).");
   app.require_subcommand(1);
@@ -29,6 +30,7 @@ int main(int argc, char** argv) {
   vantage::add_cover_command(app, run);
   vantage::add_tour_command(app, run);
   vantage::add_decode_command(app, run);
+  vantage::add_doctor_command(app, run);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -1,0 +1,152 @@
+#include "mission/main_links.hpp"
+
+#include <fmt/format.h>
+
+#include <variant>
+
+#include "drivers/link_address.hpp"
+#include "drivers/serial_port.hpp"
+#include "drivers/socketcan.hpp"
+#include "drivers/tcp_stream.hpp"
+
+namespace mission {
+namespace {
+
+enum class Kind { can, stream, registers };
+
+struct Role {
+  const char* key;  // In the robot file.
+  const std::string& address;
+  Kind kind;
+  bool may_be_empty;
+};
+
+std::vector<Role> roles_of(const RobotConfig& robot) {
+  return {{"drive.link", robot.drive.link, Kind::can, false},
+          {"scanner.link", robot.scanner.link, Kind::stream, false},
+          {"pan.link", robot.pan.link, Kind::stream, false},
+          {"imu.link", robot.imu.link, Kind::stream, false},
+          {"gnss.link", robot.gnss.link, Kind::stream, false},
+          {"power.battery_link", robot.power.battery_link, Kind::registers, true},
+          {"power.board_link", robot.power.board_link, Kind::registers, true},
+          {"power.safety_link", robot.power.safety_link, Kind::registers, true}};
+}
+
+Kind kind_of(const drivers::LinkAddress& address) {
+  if (std::holds_alternative<drivers::CanAddress>(address) ||
+      std::holds_alternative<drivers::GsUsbAddress>(address))
+    return Kind::can;
+  if (std::holds_alternative<drivers::ModbusTcpAddress>(address) ||
+      std::holds_alternative<drivers::ModbusRtuAddress>(address))
+    return Kind::registers;
+  return Kind::stream;  // UDP carries no stream: see problem_of().
+}
+
+std::string problem_of(const Role& role) {
+  if (role.address.empty())
+    return role.may_be_empty ? ""
+                             : "no link: say where the device is, such as tcp:192.168.0.1:2112";
+  const auto parsed = drivers::parse_link_address(role.address);
+  if (const auto* error = std::get_if<drivers::AddressError>(&parsed)) return error->what;
+  const auto& address = std::get<drivers::LinkAddress>(parsed);
+  if (kind_of(address) == role.kind && !std::holds_alternative<drivers::UdpAddress>(address))
+    return "";
+  switch (role.kind) {
+    case Kind::can:
+      return "a drive hangs on CAN: can:can0 or gs_usb:SERIAL/CHANNEL@500000";
+    case Kind::stream:
+      return "this device speaks on a stream: serial:/dev/ttyUSB0@9600 or tcp:HOST:PORT";
+    case Kind::registers:
+      return "this device speaks Modbus: modbus-tcp:HOST:502/UNIT or "
+             "modbus-rtu:/dev/ttyUSB0@9600N/UNIT";
+  }
+  return "";
+}
+
+// Only of texts that link_problems() had no fault with.
+drivers::LinkAddress parsed(const std::string& text) {
+  return std::get<drivers::LinkAddress>(drivers::parse_link_address(text));
+}
+
+}  // namespace
+
+std::vector<ConfigError> link_problems(const MissionConfig& config) {
+  std::vector<ConfigError> errors;
+  for (const Role& role : roles_of(config.robot)) {
+    const std::string problem = problem_of(role);
+    if (problem.empty()) continue;
+    const auto written = config.written.find(std::string("robot.") + role.key);
+    const ConfigPlace place = written == config.written.end()
+                                  ? ConfigPlace{config.robot_file.generic_string(), 0, 0}
+                                  : written->second;
+    errors.push_back({place.file, place.line, place.column,
+                      fmt::format("{} = \"{}\": {}", role.key, role.address, problem)});
+  }
+  return errors;
+}
+
+HardwareLinks::HardwareLinks(const RobotConfig& config,
+                             const boost::asio::any_io_executor& executor, hal::Clock& clock)
+    : executor_(executor), clock_(clock) {
+  ends_.drive = open_can("drive", config.drive.link);
+  ends_.scanner = open_stream("scanner", config.scanner.link);
+  ends_.pan = open_stream("pan", config.pan.link);
+  ends_.imu = open_stream("imu", config.imu.link);
+  ends_.gnss = open_stream("gnss", config.gnss.link);
+  ends_.power.battery = open_registers("power", config.power.battery_link);
+  ends_.power.board = open_registers("power", config.power.board_link);
+  ends_.power.safety = open_registers("power", config.power.safety_link);
+}
+
+HardwareLinks::~HardwareLinks() = default;
+
+hal::CanBus* HardwareLinks::open_can(const std::string& role, const std::string& address) {
+  const drivers::LinkAddress at = parsed(address);
+  if (const auto* usb = std::get_if<drivers::GsUsbAddress>(&at)) {
+    if (!usb_) usb_ = std::make_unique<drivers::GsUsbBus>(executor_, clock_);
+    auto& channel = usb_->channel(*usb);
+    named_.push_back({role, &channel});
+    return &channel;
+  }
+  auto bus =
+      std::make_shared<drivers::SocketCan>(std::get<drivers::CanAddress>(at), executor_, clock_);
+  owned_.push_back(bus);
+  named_.push_back({role, bus.get()});
+  return bus.get();
+}
+
+hal::ByteStream* HardwareLinks::open_stream(const std::string& role, const std::string& address) {
+  const drivers::LinkAddress at = parsed(address);
+  if (const auto* serial = std::get_if<drivers::SerialAddress>(&at)) {
+    auto port = std::make_shared<drivers::SerialPort>(serial->line, executor_, clock_);
+    owned_.push_back(port);
+    named_.push_back({role, port.get()});
+    return port.get();
+  }
+  auto stream =
+      std::make_shared<drivers::TcpStream>(std::get<drivers::TcpAddress>(at), executor_, clock_);
+  owned_.push_back(stream);
+  named_.push_back({role, stream.get()});
+  return stream.get();
+}
+
+// Units on one line share it.
+hal::Registers* HardwareLinks::open_registers(const std::string& role, const std::string& address) {
+  if (address.empty()) return nullptr;
+  const drivers::LinkAddress at = parsed(address);
+  const auto* rtu = std::get_if<drivers::ModbusRtuAddress>(&at);
+  const std::uint8_t number =
+      rtu != nullptr ? rtu->unit : std::get<drivers::ModbusTcpAddress>(at).unit;
+  auto& bus = modbus_[address.substr(0, address.rfind('/'))];
+  if (!bus) {
+    const drivers::ModbusBus::Address place =
+        rtu != nullptr ? drivers::ModbusBus::Address(*rtu)
+                       : drivers::ModbusBus::Address(std::get<drivers::ModbusTcpAddress>(at));
+    bus = std::make_unique<drivers::ModbusBus>(place, executor_, clock_);
+  }
+  auto& unit = bus->unit(number);
+  named_.push_back({role, &unit});
+  return &unit;
+}
+
+}  // namespace mission
