@@ -1,0 +1,90 @@
+// What a minute of simulated time costs with a drive and its unit on the wire, and without.
+#include <benchmark/benchmark.h>
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/io_context.hpp>
+
+#include "drivers/agilex_drive.hpp"
+#include "drivers/cia402_drive.hpp"
+#include "sim/agilex_unit.hpp"
+#include "sim/cia402_unit.hpp"
+#include "sim/devices.hpp"
+#include "sim/links.hpp"
+#include "sim/sim_clock.hpp"
+#include "tests/sim/room.hpp"
+
+namespace {
+
+using namespace std::chrono_literals;
+
+const sim::Scene& plain() {
+  static const sim::Mesh mesh = sim_test::plain(300);
+  static const sim::Scene scene(mesh);
+  return scene;
+}
+
+struct Minutes {
+  boost::asio::io_context io;
+  sim::SimClock clock{io};
+  sim::World world{plain(), {}};
+  sim::CanWire wire{clock};
+  sim::UnitFaults left_faults{clock}, right_faults{clock};
+
+  Minutes() { world.put_robot({{0, 0}, 0}, 0).value(); }
+
+  void spawn(hal::Task<void> task) {
+    boost::asio::co_spawn(io, std::move(task), [](std::exception_ptr problem) {
+      if (problem) std::rethrow_exception(problem);
+    });
+  }
+  hal::Task<void> read(hal::Drive& drive) {
+    for (;;) benchmark::DoNotOptimize((co_await drive.next_travel()).value());
+  }
+  hal::Task<void> turn(hal::Drive& drive) {
+    for (;;) {
+      benchmark::DoNotOptimize(co_await drive.command({0.2, 0.2}));
+      co_await clock.sleep_for(50ms);
+    }
+  }
+  // A mission mostly stands and scans: nobody commands then.
+  void run(benchmark::State& state, hal::Drive& drive) {
+    spawn(read(drive));
+    if (state.range(0) != 0) spawn(turn(drive));
+    clock.run_until(hal::Time(5s));
+    for (auto _ : state) clock.run_until(clock.now() + 1min);
+    state.SetLabel(state.range(0) != 0 ? "driving" : "standing");
+  }
+};
+
+void Spine(benchmark::State& state) {
+  Minutes minutes;
+  sim::SimDrive drive(minutes.world, minutes.clock);
+  minutes.run(state, drive);
+}
+BENCHMARK(Spine)->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
+
+void Agilex(benchmark::State& state) {
+  Minutes minutes;
+  sim::AgilexUnit unit({}, minutes.world, nullptr, minutes.clock, minutes.wire.attach(),
+                       minutes.left_faults);
+  drivers::AgilexDrive drive({}, minutes.clock, minutes.wire.attach());
+  minutes.spawn(unit.run());
+  minutes.spawn(drive.run());
+  minutes.run(state, drive);
+}
+BENCHMARK(Agilex)->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
+
+void Cia402(benchmark::State& state) {
+  Minutes minutes;
+  sim::Cia402NodeConfig left, right;
+  right.node = 2;
+  sim::Cia402Unit unit(left, right, minutes.world, minutes.clock, minutes.wire.attach(),
+                       minutes.wire.attach(), minutes.left_faults, minutes.right_faults);
+  drivers::Cia402Drive drive({}, minutes.clock, minutes.wire.attach());
+  minutes.spawn(unit.run());
+  minutes.spawn(drive.run());
+  minutes.run(state, drive);
+}
+BENCHMARK(Cia402)->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
+
+}  // namespace
