@@ -241,7 +241,7 @@ void AgilexDrive::watch_sides(hal::Time now) {
   right_.update(told.right_mps, speed.right_mps, odometer_.right_m(), odometer_.step());
   const hal::Duration stands = std::max(left_.stall.standing(), right_.stall.standing());
   if (stands < config_.stall.after + answer_took_) return;  // Late news are no standstill.
-  way_.block(wanted_);
+  way_.block({told_.forward_mmps / 1000.0, told_.turn_mradps / 1000.0});
   wanted_ = {};
   left_.stall.reset();
   right_.stall.reset();

@@ -40,7 +40,7 @@ class AgilexDrive final : public hal::Drive, public Device {
   //   errc::invalid_argument: not finite.
   hal::Task<hal::Result<void>> command(hal::Twist twist) override;
   // Waits for the base, however long it is silent: what it rolled meanwhile is in the next report,
-  // unless it was switched off. One caller at a time.
+  // unless it was switched off or given away in the meantime. One caller at a time.
   hal::Task<hal::Result<hal::WheelTravel>> next_travel() override;
 
   std::string_view model() const override;

@@ -171,7 +171,7 @@ void Cia402Drive::watch_sides() {
   const hal::Duration stands =
       std::max(left_.watch.stall.standing(), right_.watch.stall.standing());
   if (stands < config_.stall.after + late) return;  // Late news are no standstill.
-  way_.block(wanted_);
+  way_.block(told_);
   wanted_ = {};
   left_.watch.stall.reset();
   right_.watch.stall.reset();

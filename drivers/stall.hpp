@@ -19,11 +19,14 @@ class StallWatch {
   StallWatch() = default;
   explicit StallWatch(Limits limits) : limits_(limits) {}
 
-  // What a side was told to do and what it did over `step`; magnitudes.
+  // What a side was told to do and what it did over `step`.
   void update(double told_mps, double rolled_m, hal::Duration step) {
-    const bool told = told_mps >= limits_.speed_min_mps;
-    const bool stands = rolled_m < limits_.moved_share_max * told_mps * hal::seconds(step);
-    if (!told)
+    const bool told = std::abs(told_mps) >= limits_.speed_min_mps;
+    const bool turned = told_mps * told_before_mps_ < 0;
+    const bool stands =
+        std::abs(rolled_m) < limits_.moved_share_max * std::abs(told_mps) * hal::seconds(step);
+    told_before_mps_ = told_mps;
+    if (!told || turned)
       standing_ = {};
     else  // A wheel that slips once is not yet free.
       standing_ = stands ? standing_ + step : std::max(hal::Duration(0), standing_ - 2 * step);
@@ -33,6 +36,7 @@ class StallWatch {
 
  private:
   Limits limits_;
+  double told_before_mps_ = 0;
   hal::Duration standing_{};
 };
 
@@ -67,7 +71,7 @@ struct SideWatch {
   Agreement agreement;
 
   void update(double told_mps, double speed_mps, double rolled_m, hal::Duration step) {
-    stall.update(std::abs(told_mps), std::abs(rolled_m), step);
+    stall.update(told_mps, rolled_m, step);
     agreement.update(std::abs(speed_mps), std::abs(rolled_m), step);
   }
 };
