@@ -124,7 +124,7 @@ hal::Task<hal::Result<T>> PowerIo::ask(Peer& peer, hal::Task<hal::Result<T>> req
   if (reply) {
     peer.heard = true;
     peer.heard_at = now;
-    peer.took = now - asked;
+    peer.took += (now - asked - peer.took) / 4;  // One slow reply is no trouble.
     if (peer.took > late) peer.late_at = now;
   } else {
     peer.failure = reply.error();
@@ -365,7 +365,7 @@ void PowerIo::add_peer_troubles(std::vector<Trouble>& all, const Peer& peer, hal
     all.push_back({&kFaults[which(peer.failure)], detail(peer.failure.message())});
   else if (!fresh(peer, now) && now - started_at_ > kListening)
     all.push_back({&kFaults[kSilent], detail("")});
-  if (peer.late_at != hal::Time{} && now - peer.late_at <= kRemembered)
+  if (peer.late_at == peer.heard_at && fresh(peer, now))
     all.push_back({&kFaults[kLate], detail(std::to_string(peer.took / 1ms) + " ms")});
 }
 

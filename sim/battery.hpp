@@ -1,6 +1,8 @@
 // The robot's battery: charge that standing and driving use up.
 #pragma once
 
+#include <optional>
+
 #include "sim/world.hpp"
 
 namespace sim {
@@ -21,8 +23,9 @@ class Battery {
   Battery(const BatteryConfig& config, const World& world) : config_(config), world_(world) {}
 
   void update(hal::Time now) {
-    if (now <= updated_) return;
-    used_ah_ += current_a() * hal::seconds(now - updated_) / 3600;
+    if (!updated_) updated_ = now;  // Its time begins with the first question.
+    if (now < *updated_) return;
+    used_ah_ += current_a() * hal::seconds(now - *updated_) / 3600;
     if (used_ah_ > start_ah()) used_ah_ = start_ah();
     moving_ = world_.moving();
     updated_ = now;
@@ -46,7 +49,7 @@ class Battery {
 
   BatteryConfig config_;
   const World& world_;
-  hal::Time updated_{};
+  std::optional<hal::Time> updated_;
   double used_ah_ = 0;
   bool moving_ = false;
 };
