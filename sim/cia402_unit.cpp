@@ -13,7 +13,7 @@ using drivers::ByteView;
 using drivers::cia402::State;
 namespace cia402 = drivers::cia402;
 
-constexpr hal::Duration kLife = 10ms;  // Between two looks at what has to be done.
+constexpr hal::Duration kLife = 20ms;  // Between two looks at what has to be done.
 constexpr hal::Duration kBoot = 300ms;
 constexpr hal::Duration kAnswer = 1ms;       // Until an SDO is answered.
 constexpr hal::Duration kQuickStop = 200ms;  // Then its power stage is off.
@@ -140,6 +140,7 @@ void Cia402Node::reset_objects() {
   add_pdo(0x1400, 0x1600, 0x200U + config_.node);
   add_pdo(0x1800, 0x1A00, 0x180U + config_.node);
   add_pdo(0x1801, 0x1A01, 0x280U + config_.node);
+  map_pdos();
 }
 
 // Off at first, as drives without stored settings are.
@@ -217,8 +218,8 @@ hal::Task<void> Cia402Node::on_sync() {
   syncs_ = 0;
   roll();
   take_rpdo();
-  co_await send_tpdo(1);
-  co_await send_tpdo(2);
+  co_await send_tpdo(1, tpdo1_);
+  co_await send_tpdo(2, tpdo2_);
 }
 
 // --- Its objects.
@@ -263,6 +264,7 @@ std::uint32_t Cia402Node::write(Address at, ByteView data) {
     value |= static_cast<std::uint32_t>(data[i]) << (8 * i);
   if (const std::uint32_t code = refuses(found->first, object, value)) return code;
   object.value = value;
+  if (at.index >= 0x1400 && at.index < 0x1C00) map_pdos();
   if (at == cia402::kControlword) obey(static_cast<std::uint16_t>(value));
   return 0;
 }
@@ -284,39 +286,46 @@ std::uint32_t Cia402Node::refuses(Key at, const Object&, std::uint32_t value) co
   return objects_.contains(value >> 8) || value == 0 ? 0 : kNotMappable;
 }
 
-std::vector<Mapped> Cia402Node::mapping(std::uint16_t map) const {
-  std::vector<Mapped> all;
-  for (std::uint8_t i = 1; i <= object(map, 0); ++i) all.push_back(mapped(object(map, i)));
-  return all;
+void Cia402Node::map_pdos() {
+  const auto take = [this](MappedPdo& pdo, std::uint16_t parameters, std::uint16_t map) {
+    pdo = {};
+    pdo.on = object(parameters, 1) >> 31 == 0;
+    for (std::uint8_t i = 1; i <= object(map, 0); ++i) {
+      const Mapped each = mapped(object(map, i));
+      const auto found = objects_.find(key(each.at));
+      if (found == objects_.end()) continue;
+      pdo.mapping.push_back(each);
+      pdo.objects.push_back(&found->second);
+    }
+    pdo.values.resize(pdo.mapping.size());
+  };
+  take(rpdo1_, 0x1400, 0x1600);
+  take(tpdo1_, 0x1800, 0x1A00);
+  take(tpdo2_, 0x1801, 0x1A01);
 }
 
 void Cia402Node::take_rpdo() {
-  if (!rpdo_ || object(0x1400, 1) >> 31 != 0) return;
-  const auto map = mapping(0x1600);
-  std::vector<std::int64_t> values(map.size());
-  const bool fits = unpack(map, *rpdo_, values);
+  if (!rpdo_ || !rpdo1_.on) return;
+  const bool fits = unpack(rpdo1_.mapping, *rpdo_, rpdo1_.values);
   rpdo_.reset();
   if (!fits) return;
-  for (std::size_t i = 0; i < map.size(); ++i) {
-    objects_[key(map[i].at)].value = static_cast<std::uint32_t>(values[i]);
-    if (map[i].at == cia402::kControlword) obey(static_cast<std::uint16_t>(values[i]));
+  for (std::size_t i = 0; i < rpdo1_.mapping.size(); ++i) {
+    rpdo1_.objects[i]->value = static_cast<std::uint32_t>(rpdo1_.values[i]);
+    if (rpdo1_.mapping[i].at == cia402::kControlword)
+      obey(static_cast<std::uint16_t>(rpdo1_.values[i]));
   }
   wheel_.told();
 }
 
-hal::Task<void> Cia402Node::send_tpdo(std::uint8_t number) {
-  const auto step = static_cast<std::uint16_t>(number - 1);
-  const auto parameters = static_cast<std::uint16_t>(0x1800 + step);
-  if (object(parameters, 1) >> 31 != 0) co_return;
-  const auto map = mapping(static_cast<std::uint16_t>(0x1A00 + step));
-  std::vector<std::int64_t> values;
-  for (const Mapped& each : map)
-    values.push_back(live_value(key(each.at), object(each.at.index, each.at.sub)));
+hal::Task<void> Cia402Node::send_tpdo(std::uint8_t number, MappedPdo& mapped_pdo) {
+  if (!mapped_pdo.on) co_return;
+  for (std::size_t i = 0; i < mapped_pdo.mapping.size(); ++i)
+    mapped_pdo.values[i] = live_value(key(mapped_pdo.mapping[i].at), mapped_pdo.objects[i]->value);
   Pdo pdo;
   pdo.node = config_.node;
   pdo.number = number;
   pdo.from_node = true;
-  pack(map, values, pdo);
+  pack(mapped_pdo.mapping, mapped_pdo.values, pdo);
   co_await send(pdo);
 }
 

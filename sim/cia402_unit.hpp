@@ -59,6 +59,12 @@ class Cia402Node {
     bool writable = true;
   };
   using Key = std::uint32_t;  // Index and sub-index.
+  struct MappedPdo {          // As the objects say, for use at every SYNC.
+    bool on = false;
+    std::vector<drivers::canopen::Mapped> mapping;
+    std::vector<Object*> objects;
+    std::vector<std::int64_t> values;
+  };
 
   hal::Task<void> listen();
   hal::Task<void> live();
@@ -72,9 +78,9 @@ class Cia402Node {
   std::uint32_t write(drivers::canopen::Address at, drivers::ByteView data);
   std::uint32_t refuses(Key key, const Object& object, std::uint32_t value) const;
   std::uint32_t live_value(Key key, std::uint32_t stored) const;
-  std::vector<drivers::canopen::Mapped> mapping(std::uint16_t map) const;
+  void map_pdos();
   void take_rpdo();
-  hal::Task<void> send_tpdo(std::uint8_t number);
+  hal::Task<void> send_tpdo(std::uint8_t number, MappedPdo& pdo);
   void obey(std::uint16_t controlword);
   void enter(drivers::cia402::State state);
   std::uint16_t statusword() const;
@@ -99,6 +105,7 @@ class Cia402Node {
   double position_ = 0;  // Counts.
   hal::Time master_at_{}, stalled_at_{}, stopping_at_{}, next_heartbeat_{};
   std::optional<drivers::canopen::Pdo> rpdo_;
+  MappedPdo rpdo1_, tpdo1_, tpdo2_;
   int syncs_ = 0;
 };
 
