@@ -19,8 +19,9 @@ using namespace std::chrono_literals;
 
 const sim::Scene& plain() {
   static const sim::Mesh mesh = sim_test::plain(300);
-  static const sim::Scene scene(mesh);
-  return scene;
+  // Never destroyed: when statics are, Embree's own are already gone.
+  static const auto* const scene = new sim::Scene(mesh);
+  return *scene;
 }
 
 struct Minutes {

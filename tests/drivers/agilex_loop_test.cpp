@@ -338,13 +338,7 @@ TEST_F(AgilexLoop, NamesAnotherDeviceOnTheBus) {
 
 // --- Every fault of a unit, and the recovery.
 
-struct Case {
-  sim::FaultSetting setting;
-  std::string_view named;
-  bool drives;  // Through the fault.
-};
-
-class AgilexFault : public AgilexLoop, public testing::WithParamInterface<Case> {};
+class AgilexFault : public AgilexLoop, public testing::WithParamInterface<FaultCase> {};
 
 TEST_P(AgilexFault, IsNamedAndOvercome) {
   make_both();
@@ -381,14 +375,14 @@ TEST_P(AgilexFault, IsNamedAndOvercome) {
 
 INSTANTIATE_TEST_SUITE_P(
     AllEight, AgilexFault,
-    testing::Values(Case{{UnitFault::off, 0}, "no reports from the base", false},
-                    Case{{UnitFault::stuck, 0}, "base's state is frozen", false},
-                    Case{{UnitFault::garbage, 0}, "another device on the bus", false},
-                    Case{{UnitFault::wrong, 0.5}, "odometry and speed disagree", true},
-                    Case{{UnitFault::slow, 3}, "reports are missing", true},
-                    Case{{UnitFault::delayed, 0.5}, "base answers late", true},
-                    Case{{UnitFault::intermittent, 2}, "no reports from the base", false},
-                    Case{{UnitFault::duplicated_reordered, 0}, "reports doubled", true}),
+    testing::Values(FaultCase{{UnitFault::off, 0}, "no reports from the base", false},
+                    FaultCase{{UnitFault::stuck, 0}, "base's state is frozen", false},
+                    FaultCase{{UnitFault::garbage, 0}, "another device on the bus", false},
+                    FaultCase{{UnitFault::wrong, 0.5}, "odometry and speed disagree", true},
+                    FaultCase{{UnitFault::slow, 3}, "reports are missing", true},
+                    FaultCase{{UnitFault::delayed, 0.5}, "base answers late", true},
+                    FaultCase{{UnitFault::intermittent, 2}, "no reports from the base", false},
+                    FaultCase{{UnitFault::duplicated_reordered, 0}, "reports doubled", true}),
     [](const auto& its) {
       std::string name = sim::to_text({its.param.setting.fault, 0});
       name.resize(std::min(name.find(':'), name.size()));

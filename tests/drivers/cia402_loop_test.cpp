@@ -365,13 +365,8 @@ TEST_F(Cia402Loop, ChecksTheSettingsAgainstAnEds) {
 
 // --- Every fault of a node, and the recovery.
 
-struct Case {
-  sim::FaultSetting setting;
-  std::string_view named;
-};
-
 class Cia402Fault : public Cia402Loop,
-                    public testing::WithParamInterface<std::tuple<Case, bool>> {};
+                    public testing::WithParamInterface<std::tuple<FaultCase, bool>> {};
 
 TEST_P(Cia402Fault, IsNamedAndOvercome) {
   const auto& [fault, of_left] = GetParam();
@@ -407,15 +402,16 @@ TEST_P(Cia402Fault, IsNamedAndOvercome) {
 
 INSTANTIATE_TEST_SUITE_P(
     AllEight, Cia402Fault,
-    testing::Combine(testing::Values(Case{{UnitFault::off, 0}, "drive silent"},
-                                     Case{{UnitFault::stuck, 0}, "position and speed disagree"},
-                                     Case{{UnitFault::garbage, 0}, "drive silent"},
-                                     Case{{UnitFault::wrong, 0.5}, "position and speed disagree"},
-                                     Case{{UnitFault::slow, 3}, "reports are missing"},
-                                     Case{{UnitFault::delayed, 0.5}, "drive answers late"},
-                                     Case{{UnitFault::intermittent, 2}, "drive silent"},
-                                     Case{{UnitFault::duplicated_reordered, 0}, "reports doubled"}),
-                     testing::Bool()),
+    testing::Combine(
+        testing::Values(FaultCase{{UnitFault::off, 0}, "drive silent"},
+                        FaultCase{{UnitFault::stuck, 0}, "position and speed disagree"},
+                        FaultCase{{UnitFault::garbage, 0}, "drive silent"},
+                        FaultCase{{UnitFault::wrong, 0.5}, "position and speed disagree"},
+                        FaultCase{{UnitFault::slow, 3}, "reports are missing"},
+                        FaultCase{{UnitFault::delayed, 0.5}, "drive answers late"},
+                        FaultCase{{UnitFault::intermittent, 2}, "drive silent"},
+                        FaultCase{{UnitFault::duplicated_reordered, 0}, "reports doubled"}),
+        testing::Bool()),
     [](const auto& its) {
       std::string name = sim::to_text({std::get<0>(its.param).setting.fault, 0});
       name.resize(std::min(name.find(':'), name.size()));

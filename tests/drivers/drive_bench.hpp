@@ -8,6 +8,7 @@
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 #include <exception>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "hal/devices.hpp"
 #include "sim/links.hpp"
 #include "sim/sim_clock.hpp"
+#include "sim/unit_faults.hpp"
 #include "sim/world.hpp"
 #include "tests/sim/room.hpp"
 
@@ -31,8 +33,9 @@ inline const sim::Scene& plain_with_wall() {
     sim_test::add_box(ground, {kWallM, -20, 0}, {kWallM + 0.4, 20, 3});
     return ground;
   }();
-  static const sim::Scene scene(mesh);
-  return scene;
+  // Never destroyed: when statics are, Embree's own are already gone.
+  static const auto* const scene = new sim::Scene(mesh);
+  return *scene;
 }
 
 inline sim::WorldConfig without_slip() {
@@ -129,6 +132,16 @@ struct DriveBench {
   void wait(hal::Duration span) { clock.run_until(clock.now() + span); }
   double heard_m() const { return (left_m + right_m) / 2; }
 };
+
+// Of a table of faults that are set and the troubles that must name them.
+struct FaultCase {
+  sim::FaultSetting setting;
+  std::string_view named;
+  bool drives = false;  // Through the fault.
+};
+inline void PrintTo(const FaultCase& fault, std::ostream* out) {
+  *out << sim::to_text(fault.setting);
+}
 
 // "name (detail); name (detail)"
 inline std::string text(const std::vector<drivers::Trouble>& troubles) {

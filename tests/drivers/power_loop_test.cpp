@@ -329,6 +329,10 @@ struct Case {
   std::array<std::string_view, 3> named;  // Of battery, board, safety controller.
 };
 
+void PrintTo(const Case& fault, std::ostream* out) {
+  *out << sim::to_text(fault.setting);
+}
+
 class PowerFault : public PowerLoop, public testing::WithParamInterface<std::tuple<Case, Whose>> {};
 
 TEST_P(PowerFault, IsNamedAndOvercome) {
