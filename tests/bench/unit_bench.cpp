@@ -8,10 +8,10 @@
 #include "drivers/cia402_drive.hpp"
 #include "sim/agilex_unit.hpp"
 #include "sim/cia402_unit.hpp"
-#include "sim/devices.hpp"
 #include "sim/links.hpp"
 #include "sim/sim_clock.hpp"
 #include "tests/sim/room.hpp"
+#include "tests/support/direct_devices.hpp"
 
 namespace {
 
@@ -57,12 +57,12 @@ struct Minutes {
   }
 };
 
-void Spine(benchmark::State& state) {
+void Direct(benchmark::State& state) {
   Minutes minutes;
-  sim::SimDrive drive(minutes.world, minutes.clock);
+  direct::Drive drive(minutes.world, minutes.clock);
   minutes.run(state, drive);
 }
-BENCHMARK(Spine)->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
+BENCHMARK(Direct)->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
 
 void Agilex(benchmark::State& state) {
   Minutes minutes;
