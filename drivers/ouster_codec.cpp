@@ -128,6 +128,62 @@ void read_header(ByteView bytes, OusterPacket& into) {
   into.shot_limiting = bytes[19] & 15;
 }
 
+void write_header(const OusterPacket& packet, std::span<std::uint8_t> bytes) {
+  put_little<std::uint16_t>(bytes, 0, 1);
+  put_little<std::uint16_t>(bytes, 2, packet.frame_id);
+  put_little<std::uint64_t>(bytes, 4, (packet.init_id & 0xFFFFFF) | packet.serial_number << 24);
+  bytes[12] = packet.alert_flags;
+  bytes[16] = packet.shutdown_countdown_s;
+  bytes[17] = packet.shot_limiting_countdown_s;
+  bytes[18] = packet.thermal_shutdown;
+  bytes[19] = packet.shot_limiting;
+}
+
+void write_column(const OusterColumn& column, bool legacy, std::span<std::uint8_t> bytes) {
+  put_little<std::uint64_t>(bytes, 0, column.timestamp_ns);
+  put_little<std::uint16_t>(bytes, 8, column.measurement_id);
+  if (legacy) {
+    put_little<std::uint16_t>(bytes, 10, column.frame_id);
+    put_little<std::uint32_t>(bytes, 12, column.encoder);
+    put_little<std::uint32_t>(bytes, bytes.size() - 4, column.status);
+  } else {
+    put_little<std::uint16_t>(bytes, 10, static_cast<std::uint16_t>(column.status));
+  }
+}
+
+// The pixel `from` of the arrays.
+void write_pixel(OusterProfile profile, const OusterPacket& p, std::size_t from,
+                 std::span<std::uint8_t> pixel) {
+  const OusterReturn& first = p.returns[0];
+  const std::uint32_t range = first.range_mm[from], flags = first.flags[from];
+  switch (profile) {
+    case OusterProfile::legacy:
+    case OusterProfile::single:
+      put_little<std::uint32_t>(
+          pixel, 0, profile == OusterProfile::legacy ? range | flags << 28 : range | flags << 19);
+      pixel[4] = first.reflectivity[from];
+      put_little<std::uint16_t>(pixel, 6, first.signal[from]);
+      put_little<std::uint16_t>(pixel, 8, p.near_ir[from]);
+      if (profile == OusterProfile::single) pixel[11] = p.window[from];
+      break;
+    case OusterProfile::low_rate:
+      put_little<std::uint16_t>(pixel, 0, static_cast<std::uint16_t>(range / 8 | flags << 15));
+      pixel[2] = first.reflectivity[from];
+      pixel[3] = static_cast<std::uint8_t>(p.near_ir[from] / 16);
+      break;
+    case OusterProfile::dual:
+      for (std::size_t i = 0; i < 2; ++i) {
+        const OusterReturn& one = p.returns[i];
+        const std::uint32_t word = one.range_mm[from] | std::uint32_t{one.flags[from]} << 19 |
+                                   std::uint32_t{one.reflectivity[from]} << 24;
+        put_little<std::uint32_t>(pixel, 4 * i, word);
+        put_little<std::uint16_t>(pixel, 8 + 2 * i, one.signal[from]);
+      }
+      put_little<std::uint16_t>(pixel, 12, p.near_ir[from]);
+      break;
+  }
+}
+
 constexpr Fault kThermalShutdown{1, "thermal shutdown", "the sensor is too hot and will stop",
                                  "shade it, improve its mounting's cooling"};
 constexpr Fault kShotLimiting[] = {
@@ -176,6 +232,23 @@ std::string_view decode_ouster(ByteView packet, const OusterMetadata& m, OusterP
       break;
   }
   return {};
+}
+
+Bytes encode_ouster(const OusterMetadata& m, const OusterPacket& packet) {
+  Bytes bytes(m.packet_size());
+  const bool legacy = m.profile == OusterProfile::legacy;
+  const Layout layout = layout_of(m.profile);
+  const std::size_t step = column_size(layout, m.rows);
+  if (!legacy) write_header(packet, bytes);
+  for (std::size_t c = 0; c < m.columns_per_packet; ++c) {
+    const std::size_t at = layout.header + c * step;
+    write_column(packet.columns[c], legacy, std::span(bytes).subspan(at, step));
+    for (std::size_t row = 0; row < m.rows; ++row)
+      write_pixel(
+          m.profile, packet, row * m.columns_per_packet + c,
+          std::span(bytes).subspan(at + layout.column_header + row * layout.pixel, layout.pixel));
+  }
+  return bytes;
 }
 
 std::vector<const Fault*> ouster_faults(const OusterPacket& packet) {

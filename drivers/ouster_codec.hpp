@@ -68,6 +68,9 @@ struct OusterPacket {
 // Empty, or why this is no lidar packet of this sensor. Memory of `into` is reused.
 std::string_view decode_ouster(ByteView packet, const OusterMetadata& metadata, OusterPacket& into);
 
+// The other way round, for simulated scanners.
+Bytes encode_ouster(const OusterMetadata& metadata, const OusterPacket& packet);
+
 std::vector<const Fault*> ouster_faults(const OusterPacket& packet);
 
 struct OusterImu {

@@ -123,6 +123,28 @@ std::string_view decode_velodyne(ByteView packet, VelodynePacket& into) {
   return {};
 }
 
+Bytes encode_velodyne(const VelodynePacket& packet) {
+  Bytes bytes(kDataSize);
+  for (std::size_t block = 0; block < kBlocks; ++block) {
+    put_little<std::uint16_t>(bytes, block * kBlock, 0xEEFF);
+    put_little<std::uint16_t>(bytes, block * kBlock + 2, packet.block_azimuth_centideg[block]);
+    for (std::size_t i = 0; i < 2 * kLasers; ++i) {
+      const VelodynePoint& point = packet.points[block * 2 * kLasers + i];
+      const std::size_t at = block * kBlock + 4 + 3 * i;
+      put_little<std::uint16_t>(bytes, at, point.distance_2mm);
+      bytes[at + 2] = point.reflectivity;
+    }
+  }
+  put_little<std::uint32_t>(bytes, 1200, packet.timestamp_us);
+  bytes[1204] = static_cast<std::uint8_t>(packet.mode);
+  bytes[1205] = packet.product;
+  return bytes;
+}
+
+double velodyne_offset_m(std::size_t laser) {
+  return kVlp16[laser % kLasers].offset_mm / 1000;
+}
+
 double velodyne_elevation_deg(std::size_t laser) {
   return kVlp16[laser % kLasers].elevation_deg;
 }

@@ -39,7 +39,15 @@ struct VelodynePacket {
 // Empty, or why it is no data packet of a VLP-16. Memory of `into` is reused.
 std::string_view decode_velodyne(ByteView packet, VelodynePacket& into);
 
+// The other way round, for simulated scanners: azimuths of the blocks, and of the points distance
+// and reflectivity, as they stand in the packet.
+Bytes encode_velodyne(const VelodynePacket& packet);
+
+// From one packet to the next of single returns.
+inline constexpr double kVelodynePacket_us = 12 * 2 * 55.296;
+
 double velodyne_elevation_deg(std::size_t laser);
+double velodyne_offset_m(std::size_t laser);  // Of its optics above the origin.
 // REP-103: x ahead, y left, z up, metres. Nothing coming back gives the origin.
 Eigen::Vector3d velodyne_point_m(const VelodynePoint& point);
 

@@ -88,7 +88,7 @@ void ProfileCaster::Impl::Strip::cast(float* ranges_m) const {
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   for (std::uint32_t beam = 0; beam < beams; beam += kTile) {
     RTCRayHit16 rays;
-    int valid[kPacket];
+    alignas(64) int valid[kPacket];
     aim(beam, rays, valid);
     rtcIntersect16(valid, of.scene.embree(), &context, &rays);
     for (std::uint32_t i = 0; i < kPacket; ++i) {

@@ -56,7 +56,7 @@ class ScanCaster {
   void cast_columns(std::uint32_t column, float* ranges_m) {
     for (std::uint32_t row = 0; row < pattern_.rows; row += kTile) {
       RTCRayHit16 rays;
-      int valid[kPacket];
+      alignas(64) int valid[kPacket];
       aim(column, row, rays, valid);
       rtcIntersect16(valid, scene_.embree(), &context_, &rays);
       for (std::uint32_t i = 0; i < kPacket; ++i)

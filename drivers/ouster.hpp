@@ -1,0 +1,55 @@
+// Ouster OS0, OS1, OS2 over UDP: a 3-D scanner that needs no pan unit. Its metadata, as it serves
+// them at /api/v1/sensor/metadata, are part of its configuration: without them no packet can be
+// read.
+#pragma once
+
+#include "drivers/clock_fit.hpp"
+#include "drivers/ouster_codec.hpp"
+#include "drivers/udp_scanner.hpp"
+
+namespace drivers {
+
+struct OusterConfig {
+  UdpScanConfig scan;
+  OusterMetadata metadata;  // parse_ouster_metadata()
+};
+
+// S is the sensor's frame as the maker draws it. Columns are the measurements of a turn, rows the
+// beams from the lowest. Of two returns the first counts.
+class Ouster final : public UdpScanner {
+ public:
+  // The clock and the datagrams (of port 7502) must outlive it.
+  Ouster(OusterConfig config, hal::Clock& clock, hal::Datagrams& datagrams);
+
+  std::string_view model() const override { return "ouster"; }
+
+ private:
+  std::string_view read(ByteView packet, hal::Time arrival) override;
+  std::string_view check_sender() const;
+  double packet_period_s() const;
+  void tell_faults();
+  hal::ScanPattern pattern() const override { return pattern_; }
+  double turn_s() const override { return 0.2; }  // At its slowest, 5 turns a second.
+  void begin() override;
+  void fill(TurnMerge& into) override;
+  int turns_done() const override { return turns_; }
+
+  const OusterConfig config_;
+  hal::ScanPattern pattern_;
+  // Of every row and measurement: where its beam goes, its column and how far off its middle.
+  struct Cell {
+    hal::Beam beam;
+    std::uint32_t column{};
+    float off_rad{};
+  };
+  std::vector<Cell> cells_;
+  OusterPacket packet_;
+  ClockFit fit_;
+  std::vector<const Fault*> faults_;
+  std::optional<std::int64_t> last_ns_;
+  double period_s_{};  // From packet to packet, as the first one said.
+  std::optional<std::uint16_t> frame_;
+  int turns_{};
+};
+
+}  // namespace drivers

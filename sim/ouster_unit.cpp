@@ -1,0 +1,111 @@
+#include "sim/ouster_unit.hpp"
+
+#include <cmath>
+
+namespace sim {
+
+OusterUnit::OusterUnit(OusterUnitConfig config, World& world, hal::Clock& clock,
+                       DatagramSender& link, UnitFaults& faults)
+    : config_(std::move(config)),
+      world_(world),
+      clock_(clock),
+      faults_(faults),
+      link_(link, clock, faults) {
+  const drivers::OusterMetadata& m = config_.metadata;
+  const std::size_t pixels = m.rows * m.columns_per_packet;
+  packet_.init_id = 7;
+  packet_.serial_number = std::strtoull(m.serial_number.c_str(), nullptr, 10);
+  packet_.columns.resize(m.columns_per_packet);
+  for (auto& one : packet_.returns) {
+    one.range_mm.resize(pixels);
+    one.flags.resize(pixels);
+    one.reflectivity.resize(pixels);
+    one.signal.resize(pixels);
+  }
+  packet_.near_ir.resize(pixels);
+  packet_.window.resize(pixels);
+  rays_.resize(pixels);
+  ranges_m_.resize(pixels);
+  for (std::size_t row = 0; row < m.rows; ++row)
+    for (std::size_t id = 0; id < m.columns_per_frame; ++id) {
+      const auto at = [&](std::uint32_t mm) {
+        return drivers::ouster_point_m(m, row, static_cast<std::uint16_t>(id), mm);
+      };
+      const Eigen::Vector3d along = (at(101000) - at(1000)) / 100;
+      S_directions_.push_back(along);
+      S_origins_m_.push_back(at(1000) - along);
+    }
+}
+
+OusterUnit::~OusterUnit() = default;
+
+hal::Task<void> OusterUnit::run() {
+  const drivers::OusterMetadata& m = config_.metadata;
+  const double packets_per_turn =
+      static_cast<double>(m.columns_per_frame) / static_cast<double>(m.columns_per_packet);
+  const double period_s = 1 / (config_.turns_per_s * packets_per_turn);
+  for (;;) {
+    co_await clock_.sleep_for(faults_.slowed(hal::from_seconds(period_s / (1 + config_.skew))));
+    if (!faults_.silent()) {
+      measure(clock_.now());
+      co_await link_.send(drivers::encode_ouster(m, packet_));
+    }
+    own_ns_ += period_s * 1e9 * faults_.wrong_factor() * faults_.slowness();
+    ++number_;
+  }
+}
+
+// As if the robot had stood as it stands now while the packet was measured.
+void OusterUnit::measure(hal::Time at) {
+  world_.advance(at);
+  const auto& placed = world_.placed_scanner();
+  const Eigen::Isometry3d T_W_S =
+      (placed ? *placed : world_.robot()).T_W_S(world_.config().scanner.height_m);
+  const drivers::OusterMetadata& m = config_.metadata;
+  const std::uint64_t first = number_ * m.columns_per_packet;
+  const double column_ns = 1e9 / (config_.turns_per_s * static_cast<double>(m.columns_per_frame));
+  for (std::size_t c = 0; c < m.columns_per_packet; ++c) {
+    drivers::OusterColumn& column = packet_.columns[c];
+    column.timestamp_ns = static_cast<std::uint64_t>(own_ns_ + static_cast<double>(c) * column_ns);
+    column.measurement_id = static_cast<std::uint16_t>((first + c) % m.columns_per_frame);
+    column.frame_id = static_cast<std::uint16_t>((first + c) / m.columns_per_frame);
+    column.encoder = column.measurement_id * 88U;
+    column.status = 0xFFFFFFFF;
+    for (std::size_t row = 0; row < m.rows; ++row) {
+      BeamRay& ray = rays_[row * m.columns_per_packet + c];
+      const std::size_t beam = row * m.columns_per_frame + column.measurement_id;
+      ray.W_origin_m = T_W_S * S_origins_m_[beam];
+      ray.W_direction = T_W_S.linear() * S_directions_[beam];
+      ray.number = (first + c) * m.rows + row;
+    }
+  }
+  packet_.frame_id = packet_.columns.front().frame_id;
+  cast_bundle(world_.scene(), config_.ranges, mix(config_.seed), rays_, ranges_m_);
+  for (std::size_t i = 0; i < rays_.size(); ++i) {
+    const double mm = ranges_m_[i] * 1000.0 * faults_.wrong_factor() + 0.5;
+    packet_.returns[0].range_mm[i] = mm < (1 << 19) ? static_cast<std::uint32_t>(mm) : 0;
+    packet_.returns[0].reflectivity[i] = ranges_m_[i] > 0 ? 30 : 0;
+    packet_.returns[0].signal[i] = ranges_m_[i] > 0 ? 400 : 0;
+  }
+}
+
+std::string sample_ouster_metadata() {
+  std::string altitudes, azimuths, shifts;
+  for (int row = 0; row < 32; ++row) {
+    const std::string comma = row == 0 ? "" : ", ";
+    altitudes += comma + std::to_string(21.5 - row * 43.0 / 31);
+    azimuths += comma + std::to_string(row % 2 == 0 ? 1.4 : -1.4);
+    shifts += comma + std::to_string(row % 2 == 0 ? 4 : -4);
+  }
+  return R"({"prod_line": "OS-1-32", "prod_sn": "992000000042", "build_rev": "v2.5.2",
+"lidar_mode": "1024x10", "beam_altitude_angles": [)" +
+         altitudes + R"(], "beam_azimuth_angles": [)" + azimuths +
+         R"(], "lidar_origin_to_beam_origin_mm": 15.806,
+"lidar_to_sensor_transform": [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 36.18, 0, 0, 0, 1],
+"data_format": {"pixels_per_column": 32, "columns_per_packet": 16, "columns_per_frame": 1024,
+"udp_profile_lidar": "RNG19_RFL8_SIG16_NIR16", "column_window": [0, 1023],
+"pixel_shift_by_row": [)" +
+         shifts + R"(]}})";
+}
+
+}  // namespace sim

@@ -1,0 +1,23 @@
+// What a few beams of a laser scanner measure.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+
+#include "sim/range_noise.hpp"
+#include "sim/scene.hpp"
+
+namespace sim {
+
+struct BeamRay {
+  Eigen::Vector3d W_origin_m;
+  Eigen::Vector3d W_direction;  // Unit.
+  std::uint64_t number{};       // Noise depends on (key, number) only.
+};
+
+// Fastest when neighbours in the list point nearly the same way. 0 where nothing comes back.
+void cast_bundle(const Scene& scene, const ScannerModel& model, std::uint64_t key,
+                 std::span<const BeamRay> rays, std::span<float> ranges_m);
+
+}  // namespace sim
