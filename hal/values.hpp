@@ -91,7 +91,7 @@ struct Beam {
 };
 
 // One 3-D scan. ranges_m[column * rows + row] is the range along that beam in metres; 0 says that
-// nothing came back.
+// nothing came back, NaN that nothing is known: such a beam claims nothing.
 struct ScanCloud {
   Time stamp{};
   ScanPattern pattern;
@@ -109,7 +109,7 @@ struct Profile {
   double beam_period_s{};  // From one beam to the next.
   double angle_first_rad{};
   double angle_step_rad{};
-  std::vector<float> ranges_m;     // 0: nothing came back.
+  std::vector<float> ranges_m;     // 0: nothing came back. NaN: nothing is known.
   std::vector<float> intensities;  // As the device counts; empty where it sends none.
   std::uint64_t lost_before{};     // Profiles that went missing since the one before.
 };
