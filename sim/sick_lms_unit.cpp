@@ -374,44 +374,50 @@ hal::Task<void> SickLmsUnit::stream() {
       number = turns_before_ + static_cast<std::uint64_t>(std::max(0.0, std::ceil(turned)));
       continue;
     }
-    if (paced_by_ != faults_.generation()) {  // Another speed: turns are counted on from here.
-      paced_by_ = faults_.generation();
-      turning_since_ = clock_.now();
-      turns_before_ = number;
-      cast_anew_ = true;
-    }
-    const double jitter = uniform(config_.seed + 1, number);
-    const hal::Duration sent_after = config_.lms5xx ? 40200us + hal::from_seconds(0.8e-3 * jitter)
-                                                    : 3070us + hal::from_seconds(0.2e-3 * jitter);
-    const hal::Time sent = turn_start(number) + sent_after;
+    keep_pace(number);
+    const hal::Time sent = turn_start(number) + transmission(number);
     co_await clock_.sleep_until(sent);
     if (!streaming_ || !measuring_) continue;
-    if (booting()) {
-      ++number;
-      continue;
-    }
-    if (number % settings_.every_nth_scan == 0) {
-      if (std::exchange(cast_anew_, false)) {
-        const MirrorArc beams = arc();
-        const double turns = beams.beams * beams.angle_step_rad / (2 * std::numbers::pi);
-        ahead_.set_arc(beams, hal::from_seconds(period_s() * turns));
-      }
-      fill(number, ahead_.of(number));
-      scan_.transmit_us = device_us(sent);
-      const Bytes bytes = drivers::encode_lms_scan(dialect_, "sSN", scan_);
-      const bool twice = !config_.lms5xx && since_start_ == 17;  // As recorded now and then.
-      for (int i = 0; i <= twice; ++i)
-        if (!co_await link_.write(bytes, kScan)) streaming_ = false;
-      ++scans_sent_;
-      ++since_start_;
-    }
+    if (!booting() && number % settings_.every_nth_scan == 0) co_await send(number, sent);
     ++number;
   }
 }
 
-void SickLmsUnit::fill(std::uint64_t number, std::span<const float> ranges_m) {
-  const double wrong = faults_.wrong_factor();
-  const double step_mm = config_.long_range ? 2 : 1;
+// At another speed, turns are counted on from here.
+void SickLmsUnit::keep_pace(std::uint64_t number) {
+  if (paced_by_ == faults_.generation()) return;
+  paced_by_ = faults_.generation();
+  turning_since_ = clock_.now();
+  turns_before_ = number;
+  cast_anew_ = true;
+}
+
+// From a turn's start to its sending, as recorded.
+hal::Duration SickLmsUnit::transmission(std::uint64_t number) const {
+  const double jitter = uniform(config_.seed + 1, number);
+  return config_.lms5xx ? 40200us + hal::from_seconds(0.8e-3 * jitter)
+                        : 3070us + hal::from_seconds(0.2e-3 * jitter);
+}
+
+hal::Task<void> SickLmsUnit::send(std::uint64_t number, hal::Time sent) {
+  if (std::exchange(cast_anew_, false)) {
+    const MirrorArc beams = arc();
+    const double turns = beams.beams * beams.angle_step_rad / (2 * std::numbers::pi);
+    ahead_.set_arc(beams, hal::from_seconds(period_s() * turns));
+  }
+  fill_header(number, sent);
+  fill_channels(ahead_.of(number));
+  const Bytes bytes = drivers::encode_lms_scan(dialect_, "sSN", scan_);
+  const bool twice = !config_.lms5xx && since_start_ == 17;  // As recorded now and then.
+  for (int i = 0; i <= twice; ++i) {
+    const auto written = co_await link_.write(bytes, kScan);
+    if (!written) streaming_ = false;
+  }
+  ++scans_sent_;
+  ++since_start_;
+}
+
+void SickLmsUnit::fill_header(std::uint64_t number, hal::Time sent) {
   scan_.version = config_.lms5xx ? 0 : 1;
   scan_.device_number = 1;
   scan_.serial_number = config_.serial_number;
@@ -420,29 +426,33 @@ void SickLmsUnit::fill(std::uint64_t number, std::span<const float> ranges_m) {
   scan_.telegram_counter = telegram_counter_++;
   scan_.scan_counter = static_cast<std::uint16_t>(number);
   scan_.scan_start_us = device_us(turn_start(number));
+  scan_.transmit_us = device_us(sent);
   scan_.scan_frequency_centihz =
-      static_cast<std::uint32_t>(std::lround(settings_.frequency_centihz * wrong));
+      static_cast<std::uint32_t>(std::lround(settings_.frequency_centihz * faults_.wrong_factor()));
   const double beams_per_s =
       3600000.0 / settings_.resolution_1e4deg * (settings_.frequency_centihz / 100.0);
   scan_.measurement_frequency_100hz = static_cast<std::uint32_t>(std::lround(beams_per_s / 100));
+}
+
+void SickLmsUnit::fill_channels(std::span<const float> ranges_m) {
+  const double step_mm = config_.long_range ? 2 : 1;
+  const double steps_per_m = 1000 * faults_.wrong_factor() / step_mm;
   scan_.channels16.resize(settings_.remission ? 2 : 1);
-  auto& distances = scan_.channels16[0];
+  for (auto& channel : scan_.channels16) {
+    channel.start_1e4deg = settings_.start_1e4deg;
+    channel.step_1e4deg = static_cast<std::uint16_t>(settings_.resolution_1e4deg);
+    channel.raw.resize(ranges_m.size());
+  }
+  auto& distances = scan_.channels16.front();
   distances.name = {'D', 'I', 'S', 'T', '1'};
   distances.scale = static_cast<float>(step_mm);
-  distances.start_1e4deg = settings_.start_1e4deg;
-  distances.step_1e4deg = static_cast<std::uint16_t>(settings_.resolution_1e4deg);
-  distances.raw.resize(ranges_m.size());
-  const double steps_per_m = 1000 * wrong / step_mm;
   for (std::size_t i = 0; i < ranges_m.size(); ++i) {
     const double steps = ranges_m[i] * steps_per_m + 0.5;
     distances.raw[i] = steps < 65536 ? static_cast<std::uint16_t>(steps) : 0;
   }
   if (!settings_.remission) return;
-  auto& remission = scan_.channels16[1];
+  auto& remission = scan_.channels16.back();
   remission.name = {'R', 'S', 'S', 'I', '1'};
-  remission.start_1e4deg = distances.start_1e4deg;
-  remission.step_1e4deg = distances.step_1e4deg;
-  remission.raw.resize(ranges_m.size());
   for (std::size_t i = 0; i < ranges_m.size(); ++i)
     remission.raw[i] =
         ranges_m[i] > 0 ? static_cast<std::uint16_t>(20000 / (1 + ranges_m[i])) : std::uint16_t{0};

@@ -93,7 +93,11 @@ class SickLmsUnit {
   std::uint32_t device_us(hal::Time time) const;
   hal::Time turn_start(std::uint64_t number) const;
   MirrorArc arc() const;
-  void fill(std::uint64_t number, std::span<const float> ranges_m);
+  void keep_pace(std::uint64_t number);
+  hal::Duration transmission(std::uint64_t number) const;
+  hal::Task<void> send(std::uint64_t number, hal::Time sent);
+  void fill_header(std::uint64_t number, hal::Time sent);
+  void fill_channels(std::span<const float> ranges_m);
 
   const SickLmsUnitConfig config_;
   hal::Clock& clock_;
