@@ -10,6 +10,7 @@ namespace drivers {
 namespace {
 
 using namespace std::chrono_literals;
+using drivers_test::FailsOnce;
 using sim::UnitFault;
 constexpr double kDeg = std::numbers::pi / 180;
 
@@ -239,6 +240,25 @@ TEST_F(FlirPtuLoop, ComesUpWhereverTheCableIsCut) {
     wire->mend();
     ASSERT_TRUE(comes_up(*device, 60s)) << bytes << '\n' << told(*device);
     ASSERT_FALSE(move(-0.2)) << bytes << '\n' << told(*device);
+  }
+}
+
+TEST_F(FlirPtuLoop, ComesUpWhicheverCallOfTheLinkFails) {
+  for (int n = 1; n <= 60; ++n) {
+    halt_all();
+    build();
+    FailsOnce failing(wire->a(), n);
+    FlirPtu once({}, clock, failing);
+    halt_all();
+    spawn(unit->run());
+    spawn(once.run());
+    (void)result_of(once.move_to(0.3));
+    (void)result_of(once.move_to(-0.3));
+    ASSERT_TRUE(failing.failed()) << n;
+    ASSERT_TRUE(comes_up(once, 30s)) << n << '\n' << told(once);
+    ASSERT_TRUE(result_of(once.move_to(0.1))) << n << '\n' << told(once);
+    EXPECT_EQ(told(once), "") << n;
+    halt_all();
   }
 }
 

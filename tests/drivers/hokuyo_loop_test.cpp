@@ -9,6 +9,7 @@ namespace drivers {
 namespace {
 
 using namespace std::chrono_literals;
+using drivers_test::FailsOnce;
 using sim::UnitFault;
 constexpr double kDeg = std::numbers::pi / 180;
 
@@ -215,6 +216,25 @@ TEST_F(HokuyoLoop, ComesUpWhereverTheCableIsCut) {
     ASSERT_TRUE(start()) << bytes << '\n' << told(*device);
     ASSERT_EQ(take(3).size(), 3U) << bytes;
     (void)result_of(device->stop());
+  }
+}
+
+TEST_F(HokuyoLoop, ComesUpWhicheverCallOfTheLinkFails) {
+  for (int n = 1; n <= 60; ++n) {
+    halt_all();
+    build();
+    FailsOnce failing(wire->a(), n);
+    Hokuyo once({}, clock, failing);
+    halt_all();
+    spawn(unit->run());
+    spawn(once.run());
+    (void)result_of(once.start());
+    for (int i = 0; i < 40; ++i) (void)result_of(once.next_profile());
+    ASSERT_TRUE(failing.failed()) << n;
+    ASSERT_TRUE(comes_up(once, 30s)) << n << '\n' << told(once);
+    ASSERT_TRUE(result_of(once.start())) << n;
+    ASSERT_TRUE(result_of(once.next_profile())) << n;
+    halt_all();
   }
 }
 

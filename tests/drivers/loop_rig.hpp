@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "drivers/device.hpp"
+#include "hal/links.hpp"
 #include "sim/links.hpp"
 #include "sim/sim_clock.hpp"
 #include "sim/unit_faults.hpp"
@@ -22,6 +23,28 @@
 #include "tests/sim/room.hpp"
 
 namespace drivers_test {
+
+// A stream whose n-th call, counted from one, fails; the ones after it work again.
+class FailsOnce final : public hal::ByteStream {
+ public:
+  FailsOnce(hal::ByteStream& link, int n) : link_(link), left_(n) {}
+  hal::Task<hal::Result<void>> write(std::span<const std::uint8_t> bytes) override {
+    if (--left_ == 0) co_return failure();
+    co_return co_await link_.write(bytes);
+  }
+  hal::Task<hal::Result<std::size_t>> read_some(std::span<std::uint8_t> into) override {
+    if (--left_ == 0) co_return failure();
+    co_return co_await link_.read_some(into);
+  }
+  bool failed() const { return left_ <= 0; }
+
+ private:
+  static boost::system::error_code failure() {
+    return make_error_code(boost::system::errc::io_error);
+  }
+  hal::ByteStream& link_;
+  int left_;
+};
 
 // Members of a test stand below it, so that they are destroyed before the event loop.
 class LoopRig : public testing::Test {
