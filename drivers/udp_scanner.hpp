@@ -50,7 +50,7 @@ class UdpScanner : public hal::Scanner, public Device {
   hal::Task<void> run() override;
   DeviceState state() const override { return state_; }
   const Identity& identity() const override { return identity_; }
-  std::vector<Trouble> troubles() const override { return troubles_.now(); }
+  std::vector<Trouble> troubles() const override { return troubles_.all(); }
 
   std::uint64_t packets() const { return packets_; }
   std::uint64_t packets_lost() const { return lost_; }
