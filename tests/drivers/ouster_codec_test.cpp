@@ -185,6 +185,26 @@ TEST(Ouster, NewerProfilesAreReadWhole) {
   EXPECT_EQ(got.near_ir, (std::vector<std::uint16_t>{0x9ABC, 0, 0, 0x9ABC}));
 }
 
+TEST(Ouster, PacketsAreWrittenAsTheyAreRead) {
+  const Bytes column = drivers_test::from_hex(
+      "0807060504030201 0500 7e02 01020000"
+      "ffff0fa0 aa00 3412 7856 0000"
+      "39300000 0100 ffff 0000 0000"
+      "ffffffff");
+  const std::string single = "ffff7f00 7f00 3412 7856 0009", low = "0a80 7f 10";
+  const std::string dual = "01000811 02001022 3412 7856 bc9a 0000";
+  const std::pair<OusterProfile, Bytes> packets[] = {
+      {OusterProfile::legacy, drivers_test::joined({column, column})},
+      {OusterProfile::single, newer({single, single, single, single})},
+      {OusterProfile::low_rate, newer({low, low, low, low})},
+      {OusterProfile::dual, newer({dual, dual, dual, dual})}};
+  for (const auto& [profile, packet] : packets) {
+    OusterPacket got;
+    ASSERT_EQ(decode_ouster(packet, small(profile), got), "");
+    EXPECT_EQ(encode_ouster(small(profile), got), packet) << static_cast<int>(profile);
+  }
+}
+
 TEST(Ouster, RefusesWhatIsNoPacketOfTheSensor) {
   OusterPacket got;
   const OusterMetadata metadata = small(OusterProfile::low_rate);

@@ -53,6 +53,15 @@ TEST(Velodyne, OneReturnIsReadWhole) {
   }
 }
 
+TEST(Velodyne, PacketsAreWrittenAsTheyAreRead) {
+  VelodynePacket got;
+  for (const Bytes& packet :
+       {data_packet(turning(22970, 39, 1), 0x37), data_packet(turning(35980, 40, 2), 0x39)}) {
+    ASSERT_EQ(decode_velodyne(packet, got), "");
+    EXPECT_EQ(encode_velodyne(got), packet);
+  }
+}
+
 TEST(Velodyne, TwoReturnsShareTheirFiring) {
   VelodynePacket got;
   ASSERT_EQ(decode_velodyne(data_packet(turning(35980, 40, 2), 0x39), got), "");
