@@ -98,7 +98,7 @@ void print_links(const Options& options, const mission::RobotConfig& robot, cons
 }
 
 // "ROLE FAULT", one a line on standard input: "scanner garbage", "drive off", "imu none".
-void apply(const std::string& line, mission::RobotUnits& units) {
+void set_fault(const std::string& line, mission::RobotUnits& units) {
   const auto blank = line.find(' ');
   const std::string role = line.substr(0, blank);
   sim::UnitFaults* const faults = units.faults(role);
@@ -124,7 +124,7 @@ hal::Task<void> listen_to_person(asio::io_context& io, mission::RobotUnits& unit
         co_await asio::async_read_until(input, asio::dynamic_buffer(buffer, 1024), '\n',
                                         asio::redirect_error(asio::use_awaitable, error));
     if (error) co_return;  // No more to come: the units go on.
-    if (size > 1) apply(buffer.substr(0, size - 1), units);
+    if (size > 1) set_fault(buffer.substr(0, size - 1), units);
     buffer.erase(0, size);
   }
 }
@@ -132,7 +132,7 @@ hal::Task<void> listen_to_person(asio::io_context& io, mission::RobotUnits& unit
 int run(const Options& options) {
   mission::Prepared prepared = mission::prepare(
       options.mission,
-      {.site_folder = options.site, .robot_file = options.robot, .has_seed = {}, .seed = {}},
+      {.site_folder = options.site, .robot_file = options.robot, .has_seed = false, .seed = 0},
       mission::WorldUse::world);
   for (const auto& error : prepared.errors) fmt::print(stderr, "{}\n", error.text());
   if (!prepared.errors.empty()) return kRefused;

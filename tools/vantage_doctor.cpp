@@ -35,7 +35,8 @@ std::string_view name(drivers::DeviceState state) {
 }
 
 mission::MissionConfig robot_config(const std::filesystem::path& file) {
-  mission::LoadedMission loaded = mission::load_mission({}, {.robot_file = file});
+  mission::LoadedMission loaded = mission::load_mission(
+      {}, {.site_folder = {}, .robot_file = file, .has_seed = false, .seed = 0});
   // A robot alone needs no site.
   std::erase_if(loaded.errors, [&](const mission::ConfigError& error) {
     return std::filesystem::path(error.file) != file;

@@ -136,9 +136,10 @@ TEST(Architecture, NavAndPlanningTouchNoFileSocketClockOrEventLoop) {
 }
 
 TEST(Architecture, SimulatedUnitsShareCodecsButNotLoopsWithDrivers) {
-  for (const auto& include : includes_in("sim"))
-    if (include.target.starts_with("drivers/"))
-      EXPECT_EQ(waiting_part(include.target), "") << at(include);
+  for (const auto& include : includes_in("sim")) {
+    if (!include.target.starts_with("drivers/")) continue;
+    EXPECT_EQ(waiting_part(include.target), "") << at(include);
+  }
   EXPECT_EQ(waiting_part("drivers/gs_usb_codec.hpp"), "");
   EXPECT_NE(waiting_part("drivers/device.hpp"), "");
 }
