@@ -114,9 +114,8 @@ const Fault& abort_entry(std::uint32_t code) {
 }
 
 const Fault& emergency_entry(std::uint16_t code) {
-  return std::find_if(
-             std::begin(kEmergencies), std::end(kEmergencies),
-             [&](const Class& known) { return (code & known.mask) == known.fault.value; })
+  return std::find_if(std::begin(kEmergencies), std::end(kEmergencies),
+                      [&](const Class& known) { return (code & known.mask) == known.fault.value; })
       ->fault;
 }
 

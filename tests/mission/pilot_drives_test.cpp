@@ -11,10 +11,10 @@
 #include "nav/polygons.hpp"
 #include "sim/agilex_unit.hpp"
 #include "sim/cia402_unit.hpp"
-#include "tests/support/direct_devices.hpp"
 #include "sim/links.hpp"
 #include "sim/sim_clock.hpp"
 #include "tests/sim/room.hpp"
+#include "tests/support/direct_devices.hpp"
 
 namespace {
 

@@ -7,9 +7,9 @@
 #include <boost/asio/detached.hpp>
 #include <boost/asio/io_context.hpp>
 
-#include "tests/support/direct_devices.hpp"
 #include "sim/sim_clock.hpp"
 #include "tests/sim/room.hpp"
+#include "tests/support/direct_devices.hpp"
 
 namespace {
 

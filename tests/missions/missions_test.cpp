@@ -52,7 +52,9 @@ TEST_P(Sites, AreSurveyedToTheEnd) {
     boundary_after = number(after.at("boundary_unseen"));
     if (scan.at("kind").as_string() == "station") boundary_before = boundary_after;
   }
-  if (site == "fort") EXPECT_LT(boundary_after, boundary_before);
+  if (site == "fort") {
+    EXPECT_LT(boundary_after, boundary_before);
+  }
 
   // Judged by the mesh that the mission never saw.
   const auto& truth = run.object("truth");
