@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "drivers/agilex_drive.hpp"
@@ -143,8 +144,9 @@ T& RobotDrivers::own(std::string role, std::string link, std::unique_ptr<T> devi
   return reference;
 }
 
-RobotDrivers::RobotDrivers(const RobotConfig& config, const drivers::GeoAnchor& anchor,
-                           hal::Clock& clock, const Links& links)
+RobotDrivers::RobotDrivers(const RobotConfig& config,
+                           const std::optional<drivers::GeoAnchor>& anchor, hal::Clock& clock,
+                           const Links& links)
     : clock_(clock) {
   add_drive(config, links);
   add_scanner(config, links);
@@ -191,10 +193,11 @@ void RobotDrivers::add_scanner(const RobotConfig& config, const Links& links) {
   sweep_ = std::make_unique<drivers::SweepScanner>(sweep, clock_, lms, pan);
 }
 
-void RobotDrivers::add_gnss(const RobotConfig& config, const drivers::GeoAnchor& anchor,
-                            const Links& links) {
+void RobotDrivers::add_gnss(const RobotConfig& config,
+                            const std::optional<drivers::GeoAnchor>& anchor, const Links& links) {
   drivers::GnssOutputConfig output;
-  output.anchor = anchor;
+  output.anchor = anchor.value_or(drivers::GeoAnchor{});
+  if (!anchor) output.distance_max_m = std::numeric_limits<double>::infinity();
   const std::string& device = config.gnss.device;
   if (device == "nmea")
     gnss_ = &own("gnss", config.gnss.link,

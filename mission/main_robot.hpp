@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,9 +37,10 @@ class RobotDrivers {
     drivers::PowerIo::Links power;  // Null where the robot has none.
   };
 
-  // The configuration must have no problems; clock and links must outlive it.
-  RobotDrivers(const RobotConfig& config, const drivers::GeoAnchor& anchor, hal::Clock& clock,
-               const Links& links);
+  // The configuration must have no problems; clock and links must outlive it. Without an anchor no
+  // fix is too far away.
+  RobotDrivers(const RobotConfig& config, const std::optional<drivers::GeoAnchor>& anchor,
+               hal::Clock& clock, const Links& links);
   ~RobotDrivers();
 
   hal::Drive& drive() { return *drive_; }
@@ -59,7 +61,8 @@ class RobotDrivers {
  private:
   void add_drive(const RobotConfig& config, const Links& links);
   void add_scanner(const RobotConfig& config, const Links& links);
-  void add_gnss(const RobotConfig& config, const drivers::GeoAnchor& anchor, const Links& links);
+  void add_gnss(const RobotConfig& config, const std::optional<drivers::GeoAnchor>& anchor,
+                const Links& links);
   void add_power(const RobotConfig& config, const Links& links);
   template <class T>
   T& own(std::string role, std::string link, std::unique_ptr<T> device);

@@ -120,7 +120,7 @@ int diagnose(const Options& options) {
   int sick = 0;
   {
     mission::HardwareLinks links(config.robot, io.get_executor(), clock);
-    mission::RobotDrivers drivers(config.robot, {}, clock, links.ends());
+    mission::RobotDrivers drivers(config.robot, std::nullopt, clock, links.ends());
     const auto on_end = [&](std::exception_ptr error) {
       if (error && !failure) failure = error;
       io.stop();
