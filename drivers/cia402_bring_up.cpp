@@ -10,6 +10,8 @@ using namespace cia402_times;
 
 namespace {
 
+using namespace std::chrono_literals;
+
 constexpr canopen::SdoTimes kSdoTimes{600ms, 2};
 constexpr canopen::Address kDeviceType{0x1000, 0}, kErrorRegister{0x1001, 0}, kName{0x1008, 0},
     kSoftware{0x100A, 0}, kVendor{0x1018, 1}, kProduct{0x1018, 2}, kSerial{0x1018, 4};

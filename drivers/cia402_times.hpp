@@ -7,27 +7,30 @@
 
 namespace drivers::cia402_times {
 
-using namespace std::chrono_literals;
-
-constexpr hal::Duration kCycle = 20ms;
-constexpr hal::Duration kMasterHeartbeat = 100ms;
+constexpr hal::Duration kCycle = std::chrono::milliseconds(20);
+constexpr hal::Duration kMasterHeartbeat = std::chrono::milliseconds(100);
 constexpr std::uint16_t kMasterHeartbeatMaxMs = 300, kHeartbeatMs = 100;
-constexpr hal::Duration kHeartbeatMax = 350ms;
+constexpr hal::Duration kHeartbeatMax = std::chrono::milliseconds(350);
 constexpr hal::Duration kReportsMax = 3 * kCycle;  // Then both sides stop.
-constexpr hal::Duration kListening = 1s;           // Before silence at the start is trouble.
-constexpr hal::Duration kRetry = 1s;               // After a dialogue that failed.
-constexpr hal::Duration kAskPause = 1s;            // Between two looks at the error register.
-constexpr hal::Duration kAnswerLate = 100ms;
-constexpr hal::Duration kStartMax = 1s;
-constexpr hal::Duration kModeMax = 500ms;   // Until a mode that was set is shown.
-constexpr hal::Duration kEnablingMax = 2s;  // Brakes take their time.
-constexpr hal::Duration kResetPause = 1s;   // After a fault.
-constexpr hal::Duration kResetHold = 100ms;
-constexpr int kResetsMax = 3;              // Until the drive restarts.
-constexpr hal::Duration kWellAgain = 10s;  // Enabled for so long: resets are counted anew.
-constexpr hal::Duration kStanding = 200ms;
-constexpr hal::Duration kRemembered = 2s;  // Troubles that come and go are shown for so long.
-constexpr int kStrangers = 3;              // So many strange frames are no accident.
+constexpr hal::Duration kListening =
+    std::chrono::seconds(1);  // Before silence at the start is trouble.
+constexpr hal::Duration kRetry = std::chrono::seconds(1);  // After a dialogue that failed.
+constexpr hal::Duration kAskPause =
+    std::chrono::seconds(1);  // Between two looks at the error register.
+constexpr hal::Duration kAnswerLate = std::chrono::milliseconds(100);
+constexpr hal::Duration kStartMax = std::chrono::seconds(1);
+constexpr hal::Duration kModeMax =
+    std::chrono::milliseconds(500);  // Until a mode that was set is shown.
+constexpr hal::Duration kEnablingMax = std::chrono::seconds(2);  // Brakes take their time.
+constexpr hal::Duration kResetPause = std::chrono::seconds(1);   // After a fault.
+constexpr hal::Duration kResetHold = std::chrono::milliseconds(100);
+constexpr int kResetsMax = 3;  // Until the drive restarts.
+constexpr hal::Duration kWellAgain =
+    std::chrono::seconds(10);  // Enabled for so long: resets are counted anew.
+constexpr hal::Duration kStanding = std::chrono::milliseconds(200);
+constexpr hal::Duration kRemembered =
+    std::chrono::seconds(2);   // Troubles that come and go are shown for so long.
+constexpr int kStrangers = 3;  // So many strange frames are no accident.
 constexpr std::size_t kRepliesMax = 8;
 
 enum Which {

@@ -9,6 +9,8 @@ namespace errc = boost::system::errc;
 
 namespace {
 
+using namespace std::chrono_literals;
+
 // In the order of `Which`.
 constexpr Fault kFaults[] = {
     {1, "drive silent", "no power, cable loose, or another node id or bit rate is set",
