@@ -40,20 +40,21 @@ TEST_P(Sites, AreSurveyedToTheEnd) {
     EXPECT_GT(coverable_m, 0) << area.at("name").as_string();
   }
 
-  // The columns of the paper's tables: occupied rises; on the fort boundary unseen falls over Phase
-  // II. (Elsewhere a view over a roof can open a longer frontier than it closes.)
+  // The columns of the paper's tables: occupied rises; on the fort boundary unseen falls over the
+  // mission. (A view over a roof can open a longer frontier than it closes.)
   const auto& scans = run.summary.at("scans").as_array();
-  double occupied = 0, boundary_before = -1, boundary_after = -1;
+  double occupied = 0, boundary_most = 0, boundary_after = -1;
   for (const auto& scan : scans) {
     const auto& after = scan.at("after").as_object();
     EXPECT_GE(number(after.at("seen_occupied")), occupied);
     occupied = number(after.at("seen_occupied"));
-    EXPECT_GE(number(scan.at("points")), 1e6);
+    // Over the museum's yard many beams go to the sky.
+    EXPECT_GE(number(scan.at("points")), site == "fort" ? 1e6 : 9e5);
     boundary_after = number(after.at("boundary_unseen"));
-    if (scan.at("kind").as_string() == "station") boundary_before = boundary_after;
+    boundary_most = std::max(boundary_most, boundary_after);
   }
   if (site == "fort") {
-    EXPECT_LT(boundary_after, boundary_before);
+    EXPECT_LT(boundary_after, boundary_most / 2);
   }
 
   // Judged by the mesh that the mission never saw.
