@@ -212,7 +212,7 @@ TEST(Pymodbus, AnswersOurDriverOverTcpAndASerialLine) {
   hal::SafetyInputs inputs;
   hal::Result<void> pulse, off = boost::system::errc::make_error_code(errc::timed_out);
   time.spawn(power.run());
-  time.spawn([&]() -> hal::Task<void> {
+  const auto ask = [&]() -> hal::Task<void> {  // Outlives its coroutine.
     for (int i = 0; i < 100 && power.state() != DeviceState::running; ++i)
       co_await time.clock.sleep_for(100ms);
     co_await time.clock.sleep_for(500ms);
@@ -221,7 +221,8 @@ TEST(Pymodbus, AnswersOurDriverOverTcpAndASerialLine) {
     pulse = co_await power.set_relay(0, true, 700ms);
     off = co_await power.set_relay(0, false, 700ms);
     time.io.stop();
-  }());
+  };
+  time.spawn(ask());
   time.io.run();
 
   ASSERT_EQ(power.state(), DeviceState::running) << text(power.troubles());
