@@ -89,8 +89,7 @@ Prepared prepare(const std::filesystem::path& mission_file, const Overrides& ove
   prepared.notes = check.notes;
   prepared.errors = check.errors;
   if (!prepared.errors.empty()) return prepared;
-  for (const ConfigError& problem : robot_problems(prepared.config))
-    prepared.errors.push_back(problem);
+  if (use == WorldUse::world) prepared.errors = robot_problems(prepared.config);
   if (!prepared.errors.empty()) return prepared;
   if (use != WorldUse::none) load_world(prepared, check, use, model_file, check.areas);
   if (!prepared.errors.empty()) return prepared;
