@@ -91,9 +91,6 @@ drivers::LmsSettings lms_settings(const ScannerConfig& scanner) {
   settings.lms5xx = is_lms5xx(scanner);
   settings.resolution_1e4deg =
       static_cast<std::int32_t>(std::lround(1e4 * scanner.elevation_step_deg));
-  const bool slow =
-      settings.lms5xx ? settings.resolution_1e4deg < 2500 : settings.resolution_1e4deg < 5000;
-  settings.frequency_centihz = slow ? 2500 : settings.lms5xx ? 3500 : 5000;
   Arc wanted{device_deg(scanner.elevation_min_deg), device_deg(scanner.elevation_max_deg)};
   if (device_deg(180 - scanner.elevation_min_deg) <= arc.last_deg) wanted = arc;
   const auto whole_steps = [&](double angle_deg) {
@@ -104,6 +101,10 @@ drivers::LmsSettings lms_settings(const ScannerConfig& scanner) {
       start + whole_steps(std::max(wanted.first_deg, arc.first_deg)) * settings.resolution_1e4deg);
   settings.stop_1e4deg = static_cast<std::int32_t>(
       start + whole_steps(std::min(wanted.last_deg, arc.last_deg)) * settings.resolution_1e4deg);
+  for (const std::int32_t frequency : {5000, 3500, 2500}) {  // The fastest that it has.
+    settings.frequency_centihz = frequency;
+    if (drivers::lms_settings_problem(settings).empty()) break;
+  }
   return settings;
 }
 
