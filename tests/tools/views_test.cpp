@@ -26,7 +26,8 @@ class Views : public test::VantageTest {
   static void SetUpTestSuite() {
     shared_ = new test::TempFolder;
     std::ofstream(shared_->path() / "r.toml")
-        << "[scanner]\nazimuth_step_deg = 0.4\nelevation_step_deg = 0.1667\n";
+        << "[scanner]\nazimuth_step_deg = 0.4\nelevation_step_deg = 0.1667\n[pan]\nangle_max_deg = "
+           "360\n";
     write_mission("full", 100);
     rehearsal_ = test::run_program(
         "vantage", "rehearse --json " + mission("full") + " --out " + run_of("full"),
@@ -163,7 +164,8 @@ TEST_F(Views, NbvOfAnUnfinishedRunIsTheViewThatTheMissionTakesNext) {
 // Without a mission file, the run itself says where its robot could stand.
 TEST_F(Views, RadiusAndMarginAreTheRunsUnlessFilesSayOtherwise) {
   std::ofstream(shared_->path() / "broad.toml")
-      << "[body]\nradius_m = 1.9\n[scanner]\nazimuth_step_deg = 0.4\nelevation_step_deg = 0.1667\n";
+      << "[body]\nradius_m = 1.9\n[scanner]\nazimuth_step_deg = 0.4\nelevation_step_deg = "
+         "0.1667\n[pan]\nangle_max_deg = 360\n";
   write_mission("broad_run", 0);
   const std::string robot = " --robot " + (shared_->path() / "broad.toml").string();
   ASSERT_EQ(run("rehearse " + mission("broad_run") + robot + " --out " + run_of("broad_run")).code,
