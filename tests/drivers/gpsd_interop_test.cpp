@@ -178,7 +178,7 @@ struct Served {
 TEST(GpsdInterop, ARealGpsdServesTheRecordingToOurClient) {
   RECORDING_OR_SKIP(text, "gnss/nmea-rtk.log");
   const std::string program = gpsd_program();
-  if (program.empty()) GTEST_SKIP() << "no gpsd: tools/setup installs it";
+  if (program.empty()) GTEST_SKIP() << "no gpsd: tools/setup --peers installs it";
   const Recorded log = recorded(text);
   ASSERT_GT(log.epochs.size(), 100U);
   Served served(log);

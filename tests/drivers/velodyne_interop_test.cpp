@@ -27,7 +27,8 @@ class VelodyneInterop : public drivers_test::LoopRig {
  protected:
   void SetUp() override {
     if (!fs::exists(kPeer) || std::system("node --version > /dev/null 2>&1") != 0)
-      GTEST_SKIP() << "no node with @foxglove/velodyne-cloud: run tools/setup where npm is there";
+      GTEST_SKIP()
+          << "no node with @foxglove/velodyne-cloud: run tools/setup --peers where npm is there";
   }
 
   // What the peer says of each packet.
