@@ -13,6 +13,7 @@
 #include "sim/velodyne_unit.hpp"
 #include "tests/drivers/loop_rig.hpp"
 #include "tests/drivers/recordings.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace drivers {
 namespace {
@@ -33,8 +34,8 @@ class VelodyneInterop : public drivers_test::LoopRig {
 
   // What the peer says of each packet.
   std::vector<boost::json::value> ask(const std::vector<Bytes>& packets) {
-    const fs::path in = fs::path(testing::TempDir()) / "vantage_velodyne_packets";
-    const fs::path out = fs::path(testing::TempDir()) / "vantage_velodyne_points";
+    const fs::path in = folder_.path() / "packets";
+    const fs::path out = folder_.path() / "points";
     std::ofstream file(in, std::ios::binary);
     for (const Bytes& packet : packets)
       file.write(reinterpret_cast<const char*>(packet.data()),
@@ -64,6 +65,10 @@ class VelodyneInterop : public drivers_test::LoopRig {
     halt_all();
     return packets;
   }
+
+  // Other tests ask the same peer at the same time: each its own files.
+  const test::TempFolder folder_;
+
   static hal::Task<void> keep(sim::DatagramWire& wire, std::vector<Bytes>& packets) {
     Bytes buffer(2000);
     for (;;) {
