@@ -200,11 +200,16 @@ void add_yard(Model& model) {
   Part(model, "cistern").cone({-43.3, 43.1}, 2.4, 12, 2.4, 3.6);
 }
 
-// In the moat before the east curtain, and in no map: it hides much of the scarp.
-void add_gun_shed(Model& model) {
-  const Part shed(model, "gun_shed");
-  shed.box(71.2, -13.2, 80.8, 12.8, kMoatZ, 2.6);
-  shed.gable_y(70.9, -13.5, 81.1, 13.1, 2.6, 5.4);
+// In the moat before the east curtain, and in no map: it hides much of the scarp, and its yard,
+// which opens towards the scarp, from everywhere else.
+void add_gun_sheds(Model& model) {
+  const Part sheds(model, "gun_sheds");
+  sheds.box(80.0, -17.2, 86.0, 17.2, kMoatZ, 1.6);
+  sheds.gable_y(79.7, -17.5, 86.3, 17.5, 1.6, 4.0);
+  for (const double y : {-14.0, 14.0}) {
+    sheds.box(69.0, y - 3.2, 80.3, y + 3.2, kMoatZ, 1.6);
+    sheds.gable_x(68.7, y - 3.5, 80.3, y + 3.5, 1.6, 4.0);
+  }
 }
 
 Path bridge_pier() {
@@ -312,8 +317,9 @@ barracks and rampart, a dry moat, a glacis. 300 x 300 m in all, nothing above 22
   which the scanner looks over, closes the passage under the west barracks.
 - Ramparts in steps that the map does not show: walkway at 3 m, firing step at 4 m, parapet at 5.2
   m, scarp leaning back 1 in 8; the counterscarp stands up to 1 m, and the glacis falls to 0 m.
-- `gun_shed` (26 x 10 x 9 m, in the moat before the east curtain) stands in the model and not in
-  the map, and hides the scarp behind it.
+- `gun_sheds` (three wings, 8 m high, round a yard of 22 x 11 m in the moat before the east curtain)
+  stand in the model and not in the map. They hide the scarp behind them, and their yard, which
+  opens towards the scarp, is hidden from nearly everywhere.
 - Porch roofs, eaves, the passage under the west barracks and the bridge hang over free ground.
 - Faults of drawn maps: the ring of `barracks south` is left open; `barracks east` repeats a
   vertex; the southern half of `barracks west` runs clockwise; the link walls reach 5 cm into the
@@ -331,7 +337,7 @@ Site make_fort() {
   add_stairs(site.model);
   add_barracks(site.model);
   add_yard(site.model);
-  add_gun_shed(site.model);
+  add_gun_sheds(site.model);
   add_bridge_and_gate(site.model);
   // The survey ends just beyond the moat: the air over the glacis is nobody's concern.
   site.boundary(moved_edges(counterscarp_foot(), 8), false);
