@@ -17,6 +17,7 @@ namespace {
 
 namespace asio = boost::asio;
 
+constexpr hal::Duration kSayWaiting = std::chrono::seconds(5);
 constexpr hal::Duration kSettle = std::chrono::seconds(1);
 constexpr hal::Duration kRelease = std::chrono::seconds(3);  // For a drive that may be gone.
 
@@ -96,11 +97,17 @@ hal::Task<void> GuardedSurvey::run() {
 // Twice: what has just started may fall back once before it runs for good.
 hal::Task<void> GuardedSurvey::start_devices() {
   const hal::Time late = parts_.clock.now() + config_.start_patience;
-  for (int i = 0; i < 2; ++i) {
-    const hal::Result<void> started = co_await parts_.drivers.started(late - parts_.clock.now());
-    if (started.has_error())
+  for (int starts = 0; starts < 2;) {
+    const hal::Duration pause = std::min(kSayWaiting, late - parts_.clock.now());
+    const hal::Result<void> started = co_await parts_.drivers.started(pause);
+    if (started) {
+      ++starts;
+      co_await parts_.clock.sleep_for(kSettle);
+    } else if (parts_.clock.now() < late) {
+      watch_.note("waits for " + watch_.what_is_missing());
+    } else {
       throw std::runtime_error("not every device started: " + watch_.what_is_missing());
-    co_await parts_.clock.sleep_for(kSettle);
+    }
   }
 }
 

@@ -136,10 +136,11 @@ hal::Task<hal::Result<hal::ScanCloud>> WatchedScanner::scan() {
   for (int tries = 1;; ++tries) {
     co_await watch_.until_well();
     auto cloud = co_await drivers_.scanner().scan();
-    if (cloud || tries == kTriesMax) co_return cloud;
+    if (cloud) co_return cloud;
     const std::string& problem = drivers_.sweep().problem();
     watch_.note(fmt::format("scan failed, try {} of {}: {}", tries, kTriesMax,
                             problem.empty() ? cloud.error().message() : problem));
+    if (tries == kTriesMax) co_return cloud;
     co_await clock_.sleep_for(kScanAgain);
     watch_.look();
   }

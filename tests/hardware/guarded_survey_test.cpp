@@ -103,7 +103,7 @@ class Losing : public testing::TestWithParam<const char*> {};
 
 TEST_P(Losing, StopsTheRobotUntilItIsBack) {
   SimYard sim;
-  ASSERT_TRUE(sim.run_until_it_drives(2));
+  ASSERT_TRUE(sim.run_until_it_drives(1));
   sim.yard.faults(GetParam()).set({sim::UnitFault::off, 0});
   const hal::Time late = sim.clock.now() + 30s;
   ASSERT_TRUE(
@@ -127,7 +127,7 @@ TEST_P(Losing, EndsTheMissionWithTheReasonWhenItStaysAway) {
   GuardedSurvey::Config config;
   config.watch.patience = 20s;
   SimYard sim(config);
-  ASSERT_TRUE(sim.run_until_it_drives(2));
+  ASSERT_TRUE(sim.run_until_it_drives(1));
   sim.yard.faults(GetParam()).set({sim::UnitFault::off, 0});
   const hal::Time lost = sim.clock.now();
   ASSERT_TRUE(sim.run_to_the_end());
@@ -161,7 +161,7 @@ TEST(GuardedSurvey, TakesAScanAgainThatLostItsScanner) {
 
 TEST(GuardedSurvey, StandsAtOnceWhenStopped) {
   SimYard sim;
-  ASSERT_TRUE(sim.run_until_it_drives(2));
+  ASSERT_TRUE(sim.run_until_it_drives(1));
   sim.yard.survey().stop("stopped by a test");
   sim.yard.survey().stop("a second time");
   sim.clock.run_until(sim.clock.now() + 1s);
