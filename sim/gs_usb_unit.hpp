@@ -18,7 +18,7 @@ class GsUsbUnit {
  public:
   static constexpr std::uint8_t kChannels = 2;
   // Transfers that wait for the host; the newest is lost when they are full.
-  static constexpr std::size_t kWaitingMax = 256;
+  static constexpr std::size_t kWaitingMax = 4096;
 
   // Vendor requests. False, or nothing: it stalls.
   bool put(drivers::gs_usb::Request request, std::uint16_t value, const drivers::Bytes& data);
