@@ -95,6 +95,7 @@ hal::Task<void> SickLms::run() {
 // Ends when the scanner is lost; the trouble says why.
 hal::Task<void> SickLms::session() {
   asked_ = nullptr;
+  forget_clock();  // It may have been without power, for however long.
   streaming_ = set_up_lost_ = false;
   bytes_ = damaged_ = 0;
   resync_ = Resync(kColaFrameMax);

@@ -27,6 +27,8 @@ using boost::system::error_code;
 using namespace asio::experimental::awaitable_operators;
 using rtnetlink::Interface;
 
+constexpr hal::Duration kAskPause = std::chrono::milliseconds(200);
+
 error_code last_error() {
   return {errno, boost::system::system_category()};
 }
@@ -103,6 +105,7 @@ struct SocketCan::State {
   static hal::Task<void> pump(std::shared_ptr<State> self);
 
   hal::Task<void> read_news(stream_descriptor& news);
+  hal::Task<void> ask_while_off(stream_descriptor& news);
   void hear(const Interface& news);
   void open();
   void lose();
@@ -140,6 +143,7 @@ struct SocketCan::State {
   std::vector<std::pair<std::uint32_t, bool>> sent_ids;  // Their echoes must pass the filters.
   bool sending = false;
   std::optional<hal::Time> unconfirmed_since;  // A frame that the controller has.
+  std::uint64_t drops{};                       // How often what the controller had was dropped.
 };
 
 // --- The interface.
@@ -149,7 +153,7 @@ hal::Task<void> SocketCan::State::follow_interface(std::shared_ptr<State> self) 
   for (;;) {
     if (const int handle = open_news(); handle >= 0) {
       stream_descriptor news(self->executor, handle);
-      co_await self->read_news(news);  // Ends when news were lost.
+      co_await (self->read_news(news) || self->ask_while_off(news));  // Ends when news were lost.
     }
     co_await self->clock.sleep_for(pause.next());
   }
@@ -168,6 +172,17 @@ hal::Task<void> SocketCan::State::read_news(stream_descriptor& news) {
              ByteView(datagram).first(static_cast<std::size_t>(std::max<ssize_t>(size, 0)))))
       if (each.name == address.interface || (each.index == interface.index && each.index != 0))
         hear(each);
+  }
+}
+
+// The news of a restart tell the state of before where the kernel restarts the controller only
+// afterwards, and no news follow: so it is asked.
+hal::Task<void> SocketCan::State::ask_while_off(stream_descriptor& news) {
+  const Bytes question = rtnetlink::ask_for(address.interface);
+  for (;;) {
+    while (!bus_off) co_await changed.wait();
+    co_await clock.sleep_for(kAskPause);
+    if (bus_off) ::send(news.native_handle(), question.data(), question.size(), 0);
   }
 }
 
@@ -205,6 +220,7 @@ void SocketCan::State::lose() {
   socket->close(ignored);
   socket.reset();
   unconfirmed_since.reset();
+  ++drops;
   loss_untold = true;
   changed.notify();
 }
@@ -214,6 +230,7 @@ void SocketCan::State::set_bus_off(bool off) {
   if (off) {
     loss_untold = true;
     unconfirmed_since.reset();  // The controller drops it.
+    ++drops;
   }
   changed.notify();
 }
@@ -351,9 +368,10 @@ hal::Task<hal::Result<void>> SocketCan::send(hal::CanFrame frame, hal::Time dead
     }
   } const turn(state);
   if (auto written = co_await state->write(frame, deadline); !written) co_return written;
+  const std::uint64_t drops = state->drops;
   while (state->unconfirmed_since && state->usable() && state->clock.now() < deadline)
     co_await state->until_changed_or(deadline);
-  if (!state->usable()) co_return network_down();
+  if (!state->usable() || state->drops != drops) co_return network_down();
   if (state->unconfirmed_since) co_return errc::make_error_code(errc::timed_out);
   co_return hal::Result<void>{};
 }

@@ -23,6 +23,7 @@ void check_its_site(MissionCheck& check) {
   for (const auto& error : loaded.errors)
     check.errors.push_back(site_error(error, check.config.site_folder.generic_string()));
   if (!loaded.errors.empty()) return;
+  check.origin = loaded.origin;
   check.model_file = loaded.model_file;
   check.ground_mapped = std::ranges::any_of(
       loaded.raw.features, [](const auto& feature) { return feature.ground_z_m.has_value(); });

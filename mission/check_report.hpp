@@ -10,6 +10,7 @@
 
 #include "mission/check.hpp"
 #include "mission/config.hpp"
+#include "mission/geojson_crs.hpp"
 #include "nav/free_space.hpp"
 #include "nav/site_map.hpp"
 
@@ -18,6 +19,7 @@ namespace mission {
 struct MissionCheck {
   MissionConfig config;
   bool ground_mapped{};                             // The map says how high its ground lies.
+  std::optional<GeoOrigin> origin;                  // Where the site lies on the earth.
   std::optional<std::filesystem::path> model_file;  // The site's 3-D model.
   nav::RepairedSite site;                           // As far as it could be read.
   std::vector<nav::FreeArea> areas;                 // Empty when the site has errors.

@@ -136,7 +136,10 @@ SectionSpec robot_section() {
           "",
           "Which robot.",
           {keys.other("name", &R::name, "What reports call the robot"),
-           keys.other("backend", &R::backend, "What carries it out", {"sim"})},
+           keys.other("backend", &R::backend,
+                      "What carries it out: a simulated world, or the devices "
+                      "that the links lead to",
+                      {"sim", "hardware"})},
           {},
           {}};
 }

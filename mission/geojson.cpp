@@ -392,7 +392,9 @@ class Reader : JsonReader {
     bool wrong_origin = false;
     const std::optional<Crs> crs = read_crs(top, object, wrong_crs);
     std::optional<GeoOrigin> origin = read_origin(top, object, wrong_origin);
-    if (wrong_crs || wrong_origin || crs == Crs::local) return;
+    if (wrong_crs || wrong_origin) return;
+    out_.origin = origin;
+    if (crs == Crs::local) return;
     if (!crs && !looks_like_degrees(out_.raw)) return;
     if (!crs) {
       note(top,
@@ -407,6 +409,7 @@ class Reader : JsonReader {
                        first->x(), first->y()));
     }
     if (!origin) return;
+    out_.origin = origin;
     for (const std::string& off : to_local(out_.raw, *origin)) errors_.add(off);
   }
 

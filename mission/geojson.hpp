@@ -1,16 +1,19 @@
 // GeoJSON (RFC 7946) as the maps of Vantage use it; the dialect is in configs/sites/FORMAT.md.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "mission/geojson_crs.hpp"
 #include "nav/site_map.hpp"
 
 namespace mission {
 
 struct GeoJsonSite {
-  nav::RawSite raw;  // Without a name; in metres.
+  nav::RawSite raw;                 // Without a name; in metres.
+  std::optional<GeoOrigin> origin;  // Where (0, 0) lies on the earth, if the map tells.
   std::vector<std::string> notes;
   std::vector<std::string> errors;
 };

@@ -7,12 +7,12 @@
 #include <cstdio>
 #include <iostream>
 
-#include "mission/main_run.hpp"
+#include "mission/main_hardware.hpp"
 
 namespace {
 
 // Exit codes: what the operator's scripts may rely on.
-constexpr int kDone = 0, kFailed = 1, kRefused = 2;
+constexpr int kDone = 0, kFailed = 1, kRefused = 2, kStopped = 3;
 
 struct Options {
   std::filesystem::path mission;
@@ -67,23 +67,25 @@ int run(const Options& options) {
                                                  .robot_file = {},
                                                  .has_seed = options.seed.has_value(),
                                                  .seed = options.seed.value_or(0)},
-                                                mission::WorldUse::world);
+                                                mission::WorldUse::backend);
   if (!prepared.errors.empty()) return refuse(prepared.errors);
   for (const nav::Repair& repair : prepared.site.repairs)
     fmt::print(stderr, "repaired: {}: {}\n", repair.where, repair.what);
   for (const auto* notes : {&prepared.notes, &prepared.tasks.notes})
     for (const std::string& note : *notes) fmt::print(stderr, "note: {}\n", note);
-  const mission::RunOutcome outcome =
-      mission::run_in_simulation(prepared, {.out = options.out,
-                                            .judge_cells = options.judge_cells,
-                                            .threads = mission::threads_or_all(options.threads),
-                                            .progress = options.quiet ? nullptr : &std::cerr,
-                                            .terminal = isatty(STDERR_FILENO) != 0});
+  const mission::RunOptions run_options{.out = options.out,
+                                        .judge_cells = options.judge_cells,
+                                        .threads = mission::threads_or_all(options.threads),
+                                        .progress = options.quiet ? nullptr : &std::cerr,
+                                        .terminal = isatty(STDERR_FILENO) != 0};
+  const bool hardware = prepared.config.robot.backend == "hardware";
+  const mission::RunOutcome outcome = hardware ? mission::run_on_hardware(prepared, run_options)
+                                               : mission::run_in_simulation(prepared, run_options);
   print_outcome(outcome.record, outcome.report,
                 std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count());
   if (outcome.failure.empty()) return kDone;
   fmt::print(stderr, "vantaged: {}\n", outcome.failure);
-  return kFailed;
+  return outcome.stopped ? kStopped : kFailed;
 }
 
 }  // namespace
@@ -95,7 +97,8 @@ int main(int argc, char** argv) {
       "Examples:\n"
       "  vantaged configs/missions/fort.toml --out runs/fort\n"
       "  vantaged configs/missions/any_site.toml --site path/to/folder --out runs/mine\n"
-      "Exit: 0 done, 1 the mission failed (the report says how far it came), 2 refused to start.");
+      "Exit: 0 done, 1 the mission failed (the report says how far it came), 2 refused to start,\n"
+      "3 stopped by SIGINT or SIGTERM: the robot stands, and the report says how far it came.");
   app.add_option("mission", options.mission, "Mission file (TOML)")->required();
   app.add_option("--out", options.out, "Folder for the run's products")->required();
   app.add_option("--site", options.site, "Use this site folder instead of the mission's");

@@ -100,6 +100,16 @@ HardwareLinks::HardwareLinks(const RobotConfig& config,
 
 HardwareLinks::~HardwareLinks() = default;
 
+std::vector<drivers::Trouble> HardwareLinks::troubles(std::string_view role) const {
+  std::vector<drivers::Trouble> all;
+  for (const Named& named : named_) {
+    if (named.role != role) continue;
+    const auto its = named.link->troubles();
+    all.insert(all.end(), its.begin(), its.end());
+  }
+  return all;
+}
+
 hal::CanBus* HardwareLinks::open_can(const std::string& role, const std::string& address) {
   const drivers::LinkAddress at = parsed(address);
   if (const auto* usb = std::get_if<drivers::GsUsbAddress>(&at)) {

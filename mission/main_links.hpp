@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "drivers/gs_usb.hpp"
@@ -33,6 +34,8 @@ class HardwareLinks {
     drivers::Link* link{};
   };
   const std::vector<Named>& links() const { return named_; }
+  // Of all links of that role, present now.
+  std::vector<drivers::Trouble> troubles(std::string_view role) const;
 
  private:
   hal::CanBus* open_can(const std::string& role, const std::string& address);

@@ -161,16 +161,20 @@ RobotDrivers::~RobotDrivers() = default;
 
 void RobotDrivers::add_drive(const RobotConfig& config, const Links& links) {
   if (config.drive.device == "cia402") {
-    drive_ =
-        &own("drive", config.drive.link,
-             std::make_unique<drivers::Cia402Drive>(cia402_config(config), clock_, *links.drive));
+    auto& drive =
+        own("drive", config.drive.link,
+            std::make_unique<drivers::Cia402Drive>(cia402_config(config), clock_, *links.drive));
+    drive_ = &drive;
+    release_drive_ = [&drive] { return drive.release(); };
     return;
   }
   drivers::AgilexDrive::Config agilex;
   agilex.model = agilex_model(config.drive.device);
   agilex.track_m = config.body.track_m;
-  drive_ = &own("drive", config.drive.link,
-                std::make_unique<drivers::AgilexDrive>(agilex, clock_, *links.drive));
+  auto& drive = own("drive", config.drive.link,
+                    std::make_unique<drivers::AgilexDrive>(agilex, clock_, *links.drive));
+  drive_ = &drive;
+  release_drive_ = [&drive] { return drive.release(); };
 }
 
 void RobotDrivers::add_scanner(const RobotConfig& config, const Links& links) {

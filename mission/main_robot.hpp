@@ -2,6 +2,7 @@
 // it may know everything.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -57,6 +58,8 @@ class RobotDrivers {
   // not_running() says which, and why.
   hal::Task<hal::Result<void>> started(hal::Duration patience);
   std::string not_running() const;
+  // Before the program ends: the robot stands, and the drive is given back.
+  hal::Task<void> release() { return release_drive_(); }
 
  private:
   void add_drive(const RobotConfig& config, const Links& links);
@@ -71,6 +74,7 @@ class RobotDrivers {
   std::vector<std::unique_ptr<drivers::Device>> owned_;
   std::vector<NamedDevice> devices_;
   hal::Drive* drive_{};
+  std::function<hal::Task<void>()> release_drive_;
   hal::Imu* imu_{};
   hal::Gnss* gnss_{};
   std::unique_ptr<drivers::SweepScanner> sweep_;

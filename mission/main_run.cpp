@@ -6,6 +6,7 @@
 #include <ostream>
 #include <thread>
 
+#include "mission/main_links.hpp"
 #include "mission/report.hpp"
 
 namespace mission {
@@ -31,23 +32,6 @@ void load_world(Prepared& prepared, const MissionCheck& check, WorldUse use,
   for (const std::string& error : prepared.sim.errors)
     prepared.errors.push_back(site_error(error, model->generic_string()));
   if (prepared.errors.empty() && !check.ground_mapped) take_ground(prepared, areas);
-}
-
-// The products that are made once at the end; those of each scan are on disk already.
-void save_products(RunStore& store, const Survey& survey) {
-  const SiteModel& model = survey.model();
-  ProductFacts facts;
-  facts.map_ot_offset_m =
-      store.save_map(model.map().grid(), [&](planning::Voxel v) { return model.map().at(v); })
-          .value()
-          .offset_m;
-  store.save_cloud(survey.cloud()).value();
-  facts.cloud_points = survey.cloud().points().size();
-  facts.cloud_grid_m = survey.cloud().grid_m();
-  facts.cloud_doublings = survey.cloud().doublings();
-  store.save_summary(summarise(survey.record(), facts)).value();
-  store.save_report(report_html(survey.record(), facts)).value();
-  store.finish().value();
 }
 
 constexpr hal::Duration kStartPatience = std::chrono::seconds(60);
@@ -78,7 +62,36 @@ std::string run_survey(SimBackend& backend, Survey& survey) {
   return failure;
 }
 
+// What only real devices need.
+std::vector<ConfigError> hardware_problems(const MissionCheck& check) {
+  std::vector<ConfigError> errors = link_problems(check.config);
+  if (!check.origin)
+    errors.push_back(
+        {check.config.site_folder.generic_string(), 0, 0,
+         "the map does not say where it lies on the earth, which satellite fixes need; write "
+         "\"origin\": {\"lon\": ..., \"lat\": ..., \"h\": ...} beside \"features\": of (0, 0), in "
+         "degrees and metres above the ellipsoid"});
+  return errors;
+}
+
 }  // namespace
+
+// The products that are made once at the end; those of each scan are on disk already.
+void save_products(RunStore& store, const Survey& survey) {
+  const SiteModel& model = survey.model();
+  ProductFacts facts;
+  facts.map_ot_offset_m =
+      store.save_map(model.map().grid(), [&](planning::Voxel v) { return model.map().at(v); })
+          .value()
+          .offset_m;
+  store.save_cloud(survey.cloud()).value();
+  facts.cloud_points = survey.cloud().points().size();
+  facts.cloud_grid_m = survey.cloud().grid_m();
+  facts.cloud_doublings = survey.cloud().doublings();
+  store.save_summary(summarise(survey.record(), facts)).value();
+  store.save_report(report_html(survey.record(), facts)).value();
+  store.finish().value();
+}
 
 Prepared prepare(const std::filesystem::path& mission_file, const Overrides& overrides,
                  WorldUse use, const std::filesystem::path& model_file) {
@@ -86,10 +99,15 @@ Prepared prepare(const std::filesystem::path& mission_file, const Overrides& ove
   Prepared prepared;
   prepared.config = check.config;
   prepared.site = std::move(check.site);
+  prepared.origin = check.origin;
   prepared.notes = check.notes;
   prepared.errors = check.errors;
   if (!prepared.errors.empty()) return prepared;
-  if (use == WorldUse::world) prepared.errors = robot_problems(prepared.config);
+  const bool hardware = use == WorldUse::backend && prepared.config.robot.backend == "hardware";
+  if (use == WorldUse::backend) use = hardware ? WorldUse::ground : WorldUse::world;
+  if (use == WorldUse::world || hardware) prepared.errors = robot_problems(prepared.config);
+  if (hardware)
+    for (ConfigError& error : hardware_problems(check)) prepared.errors.push_back(std::move(error));
   if (!prepared.errors.empty()) return prepared;
   if (use != WorldUse::none) load_world(prepared, check, use, model_file, check.areas);
   if (!prepared.errors.empty()) return prepared;
@@ -106,8 +124,9 @@ RunOutcome run_in_simulation(Prepared& prepared, const RunOptions& options) {
   std::ostream none(nullptr);
   ProgressPrinter progress(options.progress ? *options.progress : none,
                            options.progress && options.terminal);
+  hal::ComputeHere compute;
   Survey survey(prepared.config, prepared.site.map, prepared.tasks, options.threads,
-                {backend.clock(), backend.devices(), store, progress});
+                {backend.clock(), backend.devices(), store, progress, compute});
   RunRecord& record = survey.record();
   record.repairs = prepared.site.repairs;
   record.notes.insert(record.notes.begin(), prepared.notes.begin(), prepared.notes.end());
@@ -115,7 +134,7 @@ RunOutcome run_in_simulation(Prepared& prepared, const RunOptions& options) {
   progress.finish();
   record.truth = backend.judge(record, survey.model(), prepared.tasks.tasks, options.judge_cells);
   save_products(store, survey);
-  return {std::move(record), store.report_path(), std::move(failure)};
+  return {std::move(record), store.report_path(), std::move(failure), false};
 }
 
 int threads_or_all(int threads) {

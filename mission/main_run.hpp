@@ -18,13 +18,16 @@ namespace mission {
 enum class WorldUse {
   none,    // The map alone.
   ground,  // Where the map does not tell the ground's height, the model does, if there is one.
-  world    // The model is the world to simulate: without one there is an error.
+  world,   // The model is the world to simulate: without one there is an error.
+  backend  // As the robot file says: the world for "sim"; for "hardware" the ground, and then what
+           // only real devices need is checked too: links, and where the site lies on the earth.
 };
 
 // Everything that must be right before anything starts or is written.
 struct Prepared {
   MissionConfig config;
   nav::RepairedSite site;
+  std::optional<GeoOrigin> origin;  // Of the site, if its map tells.
   SiteTasks tasks;
   SimSite sim;                     // With WorldUse::world.
   std::vector<std::string> notes;  // Of site and model; the tasks have their own.
@@ -47,13 +50,17 @@ struct RunOptions {
 struct RunOutcome {
   RunRecord record;
   std::filesystem::path report;
-  std::string failure;  // Not empty: what ended it early.
+  std::string failure;   // Not empty: what ended it early.
+  bool stopped = false;  // By a signal: not for anything that went wrong.
 };
 
 // Runs the whole mission in simulation and writes its products. Uses up prepared.sim. Throws
 // boost::system::system_error when the folder cannot be written, std::runtime_error when the robot
 // cannot stand at its start.
 RunOutcome run_in_simulation(Prepared& prepared, const RunOptions& options);
+
+// What a run is judged and reported by, whatever carried it out: writes its products.
+void save_products(RunStore& store, const Survey& survey);
 
 // Threads to use for 0: one a core.
 int threads_or_all(int threads);

@@ -94,6 +94,7 @@ LoadedSite parse_site(std::string_view json, std::string_view file_name) {
   GeoJsonSite read = read_geojson(json, std::string(file_name));
   LoadedSite site;
   site.raw = std::move(read.raw);
+  site.origin = read.origin;
   site.raw.name = fs::path(file_name).stem().string();
   site.map_file = fs::path(file_name);
   site.notes = std::move(read.notes);

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mission/geojson_crs.hpp"
 #include "nav/site_map.hpp"
 
 namespace mission {
@@ -15,6 +16,7 @@ namespace mission {
 // What a map file says, as drawn: nothing repaired, longitudes and latitudes turned into metres.
 struct LoadedSite {
   nav::RawSite raw;
+  std::optional<GeoOrigin> origin;  // Where W's origin lies on the earth, if the map tells.
   std::filesystem::path map_file;
   std::optional<std::filesystem::path> model_file;  // Empty: the site has no 3-D model.
   std::vector<std::string> notes;   // What was assumed or ignored, "file:line:column: ...".

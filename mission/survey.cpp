@@ -3,9 +3,10 @@
 #include <fmt/format.h>
 
 #include <Eigen/Eigenvalues>
-#include <boost/asio/experimental/awaitable_operators.hpp>
 #include <boost/system/system_error.hpp>
 #include <numbers>
+
+#include "hal/together.hpp"
 
 namespace mission {
 namespace {
@@ -72,6 +73,7 @@ Survey::Survey(const MissionConfig& config, const nav::SiteMap& map, SiteTasks t
       tasks_(std::move(tasks)),
       threads_(threads),
       parts_(parts),
+      began_(parts.clock.now()),
       pilot_(config.robot, parts.clock, parts.devices, tasks_.start),
       model_(config, map, tasks_.tasks, threads) {
   record_.mission = config.name;
@@ -92,12 +94,11 @@ Survey::Survey(const MissionConfig& config, const nav::SiteMap& map, SiteTasks t
 hal::Task<void> Survey::run() {
   std::exception_ptr failure;
   try {
-    plan_stations();
     // The survey decides when it is over; the pilot only keeps it company.
-    using boost::asio::experimental::awaitable_operators::operator||;
-    co_await (survey() || pilot_.track());
+    co_await hal::first_of(survey(), pilot_.track());
   } catch (const boost::system::system_error& error) {
-    record_.end = fmt::format("a device failed: {}", error.what());
+    record_.end =
+        stop_reason_.empty() ? fmt::format("a device failed: {}", error.what()) : stop_reason_;
     failure = std::current_exception();
   }
   record_.mission_s = now_s();
@@ -111,6 +112,7 @@ hal::Task<void> Survey::run() {
 }
 
 hal::Task<void> Survey::survey() {
+  co_await plan_stations();
   for (std::size_t t = 0; t < record_.plans.size(); ++t) co_await tour(t);
   co_await refine();
   co_await go_home();
@@ -155,8 +157,15 @@ void Survey::note_gnss() {
         resets));
 }
 
-void Survey::plan_stations() {
-  for (PlannedArea& planned : plan_areas(config_, map_, tasks_, threads_)) {
+hal::Task<void> Survey::plan_stations() {
+  std::vector<PlannedArea> planned;
+  const std::function<void()> plan = [&] { planned = plan_areas(config_, map_, tasks_, threads_); };
+  co_await parts_.compute.run(plan);
+  take_plans(std::move(planned));
+}
+
+void Survey::take_plans(std::vector<PlannedArea> all) {
+  for (PlannedArea& planned : all) {
     json::object decision{{"t_s", now_s()}, {"decision", "stations"}};
     for (auto& [key, value] : plan_json(planned.plan)) decision[key] = value;
     decide(std::move(decision));
@@ -186,41 +195,56 @@ hal::Task<void> Survey::tour(std::size_t t) {
 
 hal::Task<void> Survey::refine() {
   while (views_taken_ < config_.phase2.views_max) {
-    std::vector<NextView> views = choose_views();
+    std::vector<NextView> views;
+    const std::function<void()> look = [&] { views = choose_views(); };
+    co_await parts_.compute.run(look);
     if (views.empty()) {
-      record_.end = fmt::format(
-          "no next best view would see {} or more unseen voxels (the best sees {}){}",
-          config_.phase2.gain_min_voxels, model_.best_voxels(),
-          model_.set_aside()
-              ? fmt::format("; {} voxels stayed unseen after two tries each", model_.set_aside())
-              : "");
-      note_leftover(true);
+      std::string reason =
+          fmt::format("no next best view would see {} or more unseen voxels (the best sees {})",
+                      config_.phase2.gain_min_voxels, model_.best_voxels());
+      if (model_.set_aside() > 0)
+        reason += fmt::format("; {} voxels stayed unseen after two tries each", model_.set_aside());
+      co_await leave(std::move(reason), true);
       co_return;
     }
-    // The best that can be reached; the others stay excluded.
-    bool done = false;
-    while (!done) {
-      const auto chosen = choose_view(views);
-      if (!chosen) break;
-      const NextView view = views[*chosen];
-      views.erase(views.begin() + static_cast<std::ptrdiff_t>(*chosen));
-      model_.exclude(view.cell.voxel);
-      const Stop stop{.name = fmt::format("NBV {}", views_taken_ + 1),
-                      .task = view.cell.task,
-                      .pose = view.pose,
-                      .station = nullptr,
-                      .view = &view};
-      done = co_await visit(stop);
-    }
+    const bool done = co_await take_best_of(std::move(views));
     views_taken_ += done;
     if (!done && !model_.views_left_out()) {
-      record_.end = "none of the views that would add enough can be reached";
-      note_leftover(false);
+      std::string reason = "none of the views that would add enough can be reached";
+      co_await leave(std::move(reason), false);
       co_return;
     }
   }
-  record_.end = fmt::format("took views_max = {} next best views", config_.phase2.views_max);
-  note_leftover(false);
+  std::string reason = fmt::format("took views_max = {} next best views", config_.phase2.views_max);
+  co_await leave(std::move(reason), false);
+}
+
+// The best that can be reached; the others stay excluded. False: none can.
+hal::Task<bool> Survey::take_best_of(std::vector<NextView> views) {
+  for (;;) {
+    std::optional<std::size_t> chosen;
+    const std::function<void()> choose = [&, from_m = Eigen::Vector2d(pilot_.pose().position_m)] {
+      chosen = choose_view(views, from_m);
+    };
+    co_await parts_.compute.run(choose);
+    if (!chosen) co_return false;
+    const NextView view = views[*chosen];
+    views.erase(views.begin() + static_cast<std::ptrdiff_t>(*chosen));
+    model_.exclude(view.cell.voxel);
+    const Stop stop{.name = fmt::format("NBV {}", views_taken_ + 1),
+                    .task = view.cell.task,
+                    .pose = view.pose,
+                    .station = nullptr,
+                    .view = &view};
+    const bool done = co_await visit(stop);
+    if (done) co_return true;
+  }
+}
+
+hal::Task<void> Survey::leave(std::string reason, bool stopped_for_gain) {
+  record_.end = std::move(reason);
+  const std::function<void()> note = [this, stopped_for_gain] { note_leftover(stopped_for_gain); };
+  co_await parts_.compute.run(note);
 }
 
 // Goes to the stop by robot or by hand and scans. False: dropped, with the reason on record.
@@ -289,7 +313,8 @@ hal::Task<void> Survey::acquire(const Stop& stop, ScanRecord scan) {
     scan.covariance = pilot_.covariance();
     note_sigmas(scan);
   }
-  merge(cloud, stop, scan);
+  const std::function<void()> work = [&] { merge(cloud, stop, scan); };
+  co_await parts_.compute.run(work);
 }
 
 void Survey::merge(const hal::ScanCloud& cloud, const Stop& stop, ScanRecord& scan) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "hal/clock.hpp"
+#include "hal/compute.hpp"
 #include "hal/devices.hpp"
 #include "mission/config.hpp"
 #include "mission/pilot.hpp"
@@ -27,14 +28,17 @@ class Survey {
     hal::Devices& devices;
     RunStore& store;
     ProgressPrinter& progress;
+    hal::Compute& compute;  // Plans, while the robot stands and its devices are served.
   };
 
   Survey(const MissionConfig& config, const nav::SiteMap& map, SiteTasks tasks, int threads,
          Parts parts);
 
   // Device failures that a survey cannot work around throw boost::system::system_error; the record
-  // then says how far it came.
+  // then says how far it came. Cancelled, it ends as soon as what it computes is computed.
   hal::Task<void> run();
+  // What the record gives as the end of a survey that is cancelled next.
+  void stop_because(std::string reason) { stop_reason_ = std::move(reason); }
 
   const RunRecord& record() const { return record_; }
   RunRecord& record() { return record_; }
@@ -45,7 +49,8 @@ class Survey {
   struct Stop;  // Where the next scan is to be taken, and why.
 
   hal::Task<void> survey();
-  void plan_stations();
+  hal::Task<void> plan_stations();
+  void take_plans(std::vector<PlannedArea> planned);
   hal::Task<void> tour(std::size_t task);
   hal::Task<void> refine();
   hal::Task<void> go_home();
@@ -59,13 +64,16 @@ class Survey {
   void merge(const hal::ScanCloud& cloud, const Stop& stop, ScanRecord& scan);
 
   std::vector<NextView> choose_views();
-  std::optional<std::size_t> choose_view(const std::vector<NextView>& views);
+  std::optional<std::size_t> choose_view(const std::vector<NextView>& views,
+                                         const Eigen::Vector2d& from_m);
+  hal::Task<bool> take_best_of(std::vector<NextView> views);
+  hal::Task<void> leave(std::string reason, bool stopped_for_gain);
   void note_leftover(bool stopped_for_gain);
   void drop(const Stop& stop, const std::string& reason);
   void close_roads(const std::vector<Eigen::Vector2d>& obstacles_m);
   void decide(const boost::json::object& decision);
   void show(const Stop& stop);
-  double now_s() const { return hal::seconds(parts_.clock.now()); }
+  double now_s() const { return hal::seconds(parts_.clock.now() - began_); }
   const AreaTask& task(int index) const { return tasks_.tasks[static_cast<std::size_t>(index)]; }
 
   const MissionConfig config_;
@@ -73,6 +81,8 @@ class Survey {
   const SiteTasks tasks_;
   const int threads_;
   Parts parts_;
+  const hal::Time began_;
+  std::string stop_reason_;
   Pilot pilot_;
   SiteModel model_;
   int layers_at_first_{};     // Of its voxel box.

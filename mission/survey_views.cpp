@@ -49,11 +49,12 @@ std::vector<NextView> Survey::choose_views() {
   return views;
 }
 
-std::optional<std::size_t> Survey::choose_view(const std::vector<NextView>& views) {
+std::optional<std::size_t> Survey::choose_view(const std::vector<NextView>& views,
+                                               const Eigen::Vector2d& from_m) {
   const nav::Roadmap* roads = tasks_.start_area < 0
                                   ? nullptr
                                   : &roads_[static_cast<std::size_t>(tasks_.start_area)].roadmap();
-  const ViewTimes times(config_, tasks_, roads, pilot_.pose().position_m);
+  const ViewTimes times(config_, tasks_, roads, from_m);
   const auto chosen = choose(views, times, config_.phase2.choose == "gain_per_minute");
   if (!chosen) return std::nullopt;
   const NextView& view = views[chosen->view];

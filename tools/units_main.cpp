@@ -142,9 +142,13 @@ int run(const Options& options) {
   mission::SimWorld world(prepared.config, prepared.tasks, std::move(prepared.sim),
                           mission::threads_or_all(options.threads));
   Served served = serve(options, robot, io, clock);
+  const drivers::GeoAnchor anchor =
+      prepared.origin ? drivers::GeoAnchor{prepared.origin->lat_deg, prepared.origin->lon_deg,
+                                           prepared.origin->h_m, 0}
+                      : mission::kSimAnchor;
   mission::RobotUnits units(
-      robot, mission::kSimAnchor, prepared.config.seed, mission::threads_or_all(options.threads),
-      world.world(), clock,
+      robot, anchor, prepared.config.seed, mission::threads_or_all(options.threads), world.world(),
+      clock,
       {.drive = served.can.get(),
        .second_drive = served.second_can.get(),
        .scanner = served.scanner.get(),

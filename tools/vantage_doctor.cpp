@@ -50,12 +50,7 @@ mission::MissionConfig robot_config(const std::filesystem::path& file) {
 // Links first: what is wrong with a cable explains what is wrong behind it.
 std::vector<drivers::Trouble> troubles_of(const mission::NamedDevice& named,
                                           const mission::HardwareLinks& links) {
-  std::vector<drivers::Trouble> all;
-  for (const auto& link : links.links())
-    if (link.role == named.role) {
-      const auto of_link = link.link->troubles();
-      all.insert(all.end(), of_link.begin(), of_link.end());
-    }
+  std::vector<drivers::Trouble> all = links.troubles(named.role);
   const auto of_device = named.device->troubles();
   all.insert(all.end(), of_device.begin(), of_device.end());
   return all;

@@ -12,77 +12,17 @@ boost::system::error_code error(errc::errc_t code) {
   return errc::make_error_code(code);
 }
 
-struct Channel {
-  bool timed{}, started{}, bus_off{};
-  int starts{};
-  std::optional<std::pair<std::uint32_t, hal::CanFrame>> waiting{};  // Echo id, frame.
-};
-
-// A candleLight's.
-constexpr gs_usb::BitTimingLimits kLimits{
-    gs_usb::kListenOnly | gs_usb::kLoopBack, 48'000'000, 1, 16, 1, 8, 4, 1, 1024, 1};
-
 }  // namespace
 
 struct FakeGsUsb::State {
+  sim::GsUsbUnit unit;
   bool plugged_in = true;
   int plugs = 0;  // A handle of before does not know the adapter that was plugged in again.
-  bool silent = false;
-  bool little_endian = false;
   int fails_in = 0;
-  std::array<Channel, kChannels> channels;
-  std::deque<Bytes> to_host;
   hal::Wake changed;
 
-  void tell(Bytes transfer) {
-    to_host.push_back(std::move(transfer));
-    changed.notify();
-  }
-
-  void tell_error(std::uint8_t channel, std::uint32_t classes, std::uint8_t controller) {
-    hal::CanFrame frame;
-    frame.size = 8;
-    frame.data[1] = controller;
-    const auto raw = gs_usb::encode(frame, channel, gs_usb::kReceived);
-    Bytes transfer(raw.begin(), raw.end());
-    drivers::put_little<std::uint32_t>(transfer, 4, classes | 1U << 29);
-    tell(std::move(transfer));
-  }
-
-  // What the channel has waiting goes, where somebody acknowledges.
-  void transmit(std::uint8_t number) {
-    Channel& channel = channels[number];
-    const Channel& other = channels[1 - number];
-    if (!channel.waiting || silent || !channel.started || !other.started || channel.bus_off ||
-        other.bus_off)
-      return;
-    const auto [echo_id, frame] = *channel.waiting;
-    channel.waiting.reset();
-    tell(gs_usb::encode(gs_usb::Echo{echo_id, number, frame, std::nullopt}));
-    tell(gs_usb::encode(
-        gs_usb::Received{frame, static_cast<std::uint8_t>(1 - number), false, std::nullopt}));
-  }
-
-  // What the firmware does with a request; false: it stalls.
-  bool take(Request request, std::uint16_t value, const Bytes& data) {
-    if (request == Request::host_format) return little_endian = data == gs_usb::host_format();
-    if (!little_endian || value >= kChannels) return false;
-    Channel& channel = channels[value];
-    if (request == Request::bit_timing) {
-      if (channel.started || !gs_usb::decode_timing(data)) return false;
-      return channel.timed = true;
-    }
-    if (request != Request::mode) return false;
-    if (data == gs_usb::reset_mode()) {
-      channel = {.starts = channel.starts};
-      return true;
-    }
-    const auto flags = drivers::little<std::uint32_t>(data, 4);
-    if (!channel.timed || (flags & ~kLimits.features) != 0) return false;
-    channel.started = true;
-    ++channel.starts;
-    for (std::uint8_t each = 0; each < kChannels; ++each) transmit(each);
-    return true;
+  State() {
+    unit.on_ready([this] { changed.notify(); });
   }
 
   std::optional<boost::system::error_code> problem(int plug) {
@@ -101,36 +41,29 @@ class FakeGsUsb::Pipe final : public drivers::UsbPipe {
 
   hal::Task<hal::Result<void>> put(Request request, std::uint16_t value, Bytes data) override {
     if (const auto problem = state_->problem(plug_)) co_return *problem;
-    if (!state_->take(request, value, data)) co_return error(errc::not_supported);
+    if (!state_->unit.put(request, value, data)) co_return error(errc::not_supported);
     co_return hal::Result<void>{};
   }
 
   hal::Task<hal::Result<Bytes>> get(Request request, std::uint16_t value, std::size_t) override {
     if (const auto problem = state_->problem(plug_)) co_return *problem;
-    if (request == Request::device_config)
-      co_return gs_usb::encode(gs_usb::DeviceConfig{kChannels, 2, 1});
-    if (request == Request::bit_timing_limits && value < kChannels)
-      co_return gs_usb::encode(kLimits);
-    co_return error(errc::not_supported);
+    auto answer = state_->unit.get(request, value);
+    if (!answer) co_return error(errc::not_supported);
+    co_return std::move(*answer);
   }
 
   hal::Task<hal::Result<void>> write(Bytes frame) override {
     if (const auto problem = state_->problem(plug_)) co_return *problem;
-    const auto decoded = gs_usb::decode(frame, false);
-    const auto& echo = std::get<gs_usb::Echo>(decoded);
-    auto& channel = state_->channels.at(echo.channel);
-    // One waits here; what a driver sends on top of it is lost, and its echo with it.
-    if (!channel.waiting) channel.waiting = {echo.id, echo.frame};
-    state_->transmit(echo.channel);
+    state_->unit.take(frame);
     co_return hal::Result<void>{};
   }
 
   hal::Task<hal::Result<Bytes>> read() override {
-    while (state_->plugs == plug_ && state_->to_host.empty()) co_await state_->changed.wait();
+    std::optional<Bytes> transfer;
+    while (state_->plugs == plug_ && !(transfer = state_->unit.next()))
+      co_await state_->changed.wait();
     if (const auto problem = state_->problem(plug_)) co_return *problem;
-    Bytes transfer = std::move(state_->to_host.front());
-    state_->to_host.pop_front();
-    co_return transfer;
+    co_return std::move(*transfer);
   }
 
  private:
@@ -153,27 +86,23 @@ drivers::GsUsbAdapter::Open FakeGsUsb::open() {
 void FakeGsUsb::unplug() {
   state_->plugged_in = false;
   ++state_->plugs;
-  state_->little_endian = false;
-  state_->channels = {};
-  state_->to_host.clear();
+  state_->unit.power_cycle();
   state_->changed.notify();
 }
 void FakeGsUsb::plug_in() {
   state_->plugged_in = true;
 }
 void FakeGsUsb::silence(bool on) {
-  state_->silent = on;
-  for (std::uint8_t each = 0; each < kChannels; ++each) state_->transmit(each);
+  state_->unit.silence(on);
 }
 void FakeGsUsb::go_bus_off(std::uint8_t channel) {
-  state_->channels.at(channel).bus_off = true;
-  state_->tell_error(channel, 0x40, 0);
+  state_->unit.go_bus_off(channel);
 }
 void FakeGsUsb::go_passive(std::uint8_t channel) {
-  state_->tell_error(channel, 0x04, 0x20);
+  state_->unit.go_passive(channel);
 }
 void FakeGsUsb::hear(std::uint8_t channel, const hal::CanFrame& frame, bool overflow) {
-  state_->tell(gs_usb::encode(gs_usb::Received{frame, channel, overflow, std::nullopt}));
+  state_->unit.hear(channel, frame, overflow);
 }
 void FakeGsUsb::keep_stale(const hal::CanFrame& frame) {
   hear(0, frame, false);
@@ -182,7 +111,7 @@ void FakeGsUsb::fail_call(int n) {
   state_->fails_in = n;
 }
 int FakeGsUsb::starts(std::uint8_t channel) const {
-  return state_->channels.at(channel).starts;
+  return state_->unit.starts(channel);
 }
 
 }  // namespace links_test

@@ -1,21 +1,16 @@
-// A gs_usb adapter with two channels on one CAN bus, behind the same seam as libusb: it answers by
-// the protocol, and stalls where a real one does.
+// The simulated gs_usb adapter behind the same seam as libusb.
 #pragma once
 
-#include <array>
-#include <deque>
 #include <memory>
-#include <optional>
 
 #include "drivers/gs_usb_adapter.hpp"
 #include "hal/wake.hpp"
+#include "sim/gs_usb_unit.hpp"
 
 namespace links_test {
 
 class FakeGsUsb {
  public:
-  static constexpr std::uint8_t kChannels = 2;
-
   FakeGsUsb();
   ~FakeGsUsb();
   FakeGsUsb(const FakeGsUsb&) = delete;

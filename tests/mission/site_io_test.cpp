@@ -433,5 +433,17 @@ TEST(RealMaps, DegreesAndMetresOfTheSameCampusAgree) {
   EXPECT_NEAR(built_m2("buildings_wgs84.geojson") / metres, 1, 0.005);
 }
 
+TEST(SiteIo, KeepsWhereTheMapLiesOnTheEarth) {
+  const std::string origin = R"("origin":{"lon":11,"lat":48,"h":500},)";
+  for (const char* crs : {R"("crs":"local",)", R"("crs":"WGS84",)"}) {
+    const LoadedSite site = parse(map_of(feature(""), crs + origin));
+    ASSERT_TRUE(site.origin) << crs;
+    EXPECT_DOUBLE_EQ(site.origin->lon_deg, 11);
+    EXPECT_DOUBLE_EQ(site.origin->lat_deg, 48);
+    EXPECT_DOUBLE_EQ(site.origin->h_m, 500);
+  }
+  EXPECT_FALSE(parse(map_of(feature(""), R"("crs":"local",)")).origin);
+}
+
 }  // namespace
 }  // namespace mission

@@ -1,0 +1,178 @@
+#include "mission/main_hardware.hpp"
+
+#include <fmt/format.h>
+
+#include <boost/asio/bind_cancellation_slot.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <csignal>
+#include <ostream>
+
+#include "drivers/real_clock.hpp"
+#include "hal/together.hpp"
+#include "mission/main_worker.hpp"
+
+namespace mission {
+namespace {
+
+namespace asio = boost::asio;
+
+constexpr hal::Duration kSayWaiting = std::chrono::seconds(5);
+constexpr hal::Duration kSettle = std::chrono::seconds(1);
+constexpr hal::Duration kRelease = std::chrono::seconds(3);  // For a drive that may be gone.
+
+std::string text_of(std::exception_ptr error) {
+  try {
+    if (error) std::rethrow_exception(error);
+  } catch (const std::exception& e) {
+    return e.what();
+  }
+  return "";
+}
+
+hal::Task<void> release_within(RobotDrivers& drivers, hal::Clock& clock) {
+  co_await hal::first_of(drivers.release(), clock.sleep_for(kRelease));
+}
+
+std::string placed_by_hand(const SiteTasks& tasks) {
+  std::string areas;
+  for (const AreaTask& task : tasks.tasks)
+    if (task.mode == AreaMode::manual) areas += (areas.empty() ? "" : ", ") + task.area.name;
+  return areas;
+}
+
+// The record's own notes come first.
+void note_run(RunRecord& record, const Prepared& prepared, const DeviceWatch& watch) {
+  record.repairs = prepared.site.repairs;
+  record.notes.insert(record.notes.begin(), prepared.notes.begin(), prepared.notes.end());
+  if (const std::string areas = placed_by_hand(prepared.tasks); !areas.empty())
+    record.notes.push_back("nobody was there to set up the scanner by hand in: " + areas);
+  record.notes.insert(record.notes.end(), watch.notes().begin(), watch.notes().end());
+}
+
+// Tells whoever looks at the program, and stops it when told to by a signal.
+class Signals {
+ public:
+  Signals(asio::io_context& io, GuardedSurvey& survey) : set_(io, SIGINT, SIGTERM) {
+    set_.async_wait([this, &survey](boost::system::error_code error, int number) {
+      if (error) return;
+      set_.clear();  // The next one ends the program.
+      survey.stop(fmt::format("stopped by {}", number == SIGINT ? "SIGINT" : "SIGTERM"));
+    });
+  }
+
+ private:
+  asio::signal_set set_;
+};
+
+}  // namespace
+
+GuardedSurvey::GuardedSurvey(const Prepared& prepared, int threads, Config config, Parts parts)
+    : config_(std::move(config)),
+      parts_(parts),
+      watch_(config_.watch, parts.drivers, parts.clock),
+      drive_(parts.drivers.drive(), watch_, parts.clock),
+      imu_(parts.drivers.imu(), watch_, parts.clock),
+      gnss_(parts.drivers.gnss(), watch_, parts.clock),
+      scanner_(parts.drivers, watch_, parts.clock),
+      devices_{drive_, imu_, gnss_, scanner_, placement_},
+      survey_(prepared.config, prepared.site.map, prepared.tasks, threads,
+              {parts.clock, devices_, parts.store, parts.progress, parts.compute}) {}
+
+void GuardedSurvey::start() {
+  const auto devices_ended = [this](std::exception_ptr error) { on_devices_end(error); };
+  asio::co_spawn(parts_.io, parts_.drivers.run(),
+                 asio::bind_cancellation_slot(cancel_devices_.slot(), devices_ended));
+  const auto run_ended = [this](std::exception_ptr error) { on_run_end(error); };
+  asio::co_spawn(parts_.io, run(), asio::bind_cancellation_slot(cancel_run_.slot(), run_ended));
+}
+
+hal::Task<void> GuardedSurvey::run() {
+  co_await start_devices();
+  surveying_ = true;
+  co_await hal::first_of(survey_.run(), watch_it());
+  if (!watch_.given_up().empty()) throw std::runtime_error(watch_.given_up());
+}
+
+// Twice: what has just started may fall back once before it runs for good.
+hal::Task<void> GuardedSurvey::start_devices() {
+  const hal::Time late = parts_.clock.now() + config_.start_patience;
+  for (int starts = 0; starts < 2;) {
+    const hal::Duration pause = std::min(kSayWaiting, late - parts_.clock.now());
+    const hal::Result<void> started = co_await parts_.drivers.started(pause);
+    if (started) {
+      ++starts;
+      co_await parts_.clock.sleep_for(kSettle);
+    } else if (parts_.clock.now() < late) {
+      watch_.note("waits for " + watch_.what_is_missing());
+    } else {
+      throw std::runtime_error("not every device started: " + watch_.what_is_missing());
+    }
+  }
+}
+
+// The survey is cancelled when this ends.
+hal::Task<void> GuardedSurvey::watch_it() {
+  co_await watch_.run();
+  survey_.stop_because(watch_.given_up());
+}
+
+void GuardedSurvey::stop(std::string reason) {
+  if (released_ || !stop_reason_.empty()) return;
+  stop_reason_ = std::move(reason);
+  survey_.stop_because(stop_reason_);
+  cancel_run_.emit(asio::cancellation_type::terminal);
+}
+
+// Whatever ended it, the robot stands before the program goes on.
+void GuardedSurvey::on_run_end(std::exception_ptr error) {
+  if (failure_.empty()) failure_ = stop_reason_.empty() ? text_of(error) : stop_reason_;
+  if (!surveying_) survey_.record().end = failure_;
+  asio::co_spawn(parts_.io, release_within(parts_.drivers, parts_.clock),
+                 [this](std::exception_ptr release_error) { on_released(release_error); });
+}
+
+void GuardedSurvey::on_released(std::exception_ptr error) {
+  if (error) watch_.note("the drive was not given back: " + text_of(error));
+  released_ = true;
+  cancel_devices_.emit(asio::cancellation_type::terminal);
+}
+
+void GuardedSurvey::on_devices_end(std::exception_ptr error) {
+  devices_over_ = true;
+  if (released_) return;  // As it should.
+  failure_ = "the device loops ended: " + text_of(error);
+  survey_.stop_because(failure_);
+  cancel_run_.emit(asio::cancellation_type::terminal);
+}
+
+RunOutcome run_on_hardware(Prepared& prepared, const RunOptions& options) {
+  RunStore store = RunStore::open(options.out).value();
+  std::ostream none(nullptr);
+  std::ostream& out = options.progress ? *options.progress : none;
+  ProgressPrinter progress(out, options.progress && options.terminal);
+  asio::io_context io{1};
+  drivers::RealClock clock;
+  const RobotConfig& robot = prepared.config.robot;
+  HardwareLinks links(robot, io.get_executor(), clock);
+  const drivers::GeoAnchor anchor{prepared.origin->lat_deg, prepared.origin->lon_deg,
+                                  prepared.origin->h_m, 0};
+  RobotDrivers drivers(robot, anchor, clock, links.ends());
+  Worker worker;
+  GuardedSurvey::Config config;
+  config.watch.link_troubles = [&links](std::string_view role) { return links.troubles(role); };
+  config.watch.tell = [&progress](const std::string& what) { progress.message(what); };
+  GuardedSurvey guarded(prepared, options.threads, config,
+                        {io, clock, drivers, store, progress, worker});
+  const Signals signals(io, guarded);
+  guarded.start();
+  while (!guarded.ended()) io.run_one();
+  progress.finish();
+  RunRecord& record = guarded.survey().record();
+  note_run(record, prepared, guarded.watch());
+  save_products(store, guarded.survey());
+  return {std::move(record), store.report_path(), guarded.failure(),
+          !guarded.stop_reason().empty()};
+}
+
+}  // namespace mission

@@ -1,0 +1,153 @@
+#include "mission/main_watch.hpp"
+
+#include <fmt/format.h>
+
+namespace mission {
+namespace {
+
+using namespace std::chrono_literals;
+namespace errc = boost::system::errc;
+
+constexpr hal::Duration kLook = 50ms;
+constexpr hal::Duration kTryAgain = 100ms;
+constexpr hal::Duration kScanAgain = 5s;  // By then a loss that made it fail shows.
+
+bool away(const NamedDevice& named) {
+  return named.device->state() != drivers::DeviceState::running;
+}
+
+// Until what a device gives is no failure: with a pause, and not while one is missing.
+template <class Next>
+auto insist(DeviceWatch& watch, hal::Clock& clock, Next next) -> decltype(next()) {
+  for (;;) {
+    auto result = co_await next();
+    if (result) co_return result;
+    watch.look();
+    co_await clock.sleep_for(kTryAgain);
+    co_await watch.until_well();
+  }
+}
+
+}  // namespace
+
+DeviceWatch::DeviceWatch(Config config, const RobotDrivers& drivers, hal::Clock& clock)
+    : config_(std::move(config)), drivers_(drivers), clock_(clock) {}
+
+hal::Task<void> DeviceWatch::run() {
+  for (;;) {
+    look();
+    if (!well_ && clock_.now() - lost_at_ > config_.patience) break;
+    co_await clock_.sleep_for(kLook);
+  }
+  given_up_ = fmt::format("waited {:.0f} s in vain for {}", hal::seconds(config_.patience),
+                          what_is_missing());
+}
+
+// A reason that changes is told again.
+void DeviceWatch::look() {
+  const std::string missing = missing_names();
+  if (missing.empty()) {
+    if (!std::exchange(well_, true)) {
+      note(fmt::format("all devices are back after {:.1f} s: it goes on",
+                       hal::seconds(clock_.now() - lost_at_)));
+      back_.notify();
+    }
+    told_.clear();
+    return;
+  }
+  if (std::exchange(well_, false)) lost_at_ = clock_.now();
+  if (missing == told_) return;
+  told_ = missing;
+  note("the robot stands, because it misses " + what_is_missing());
+}
+
+hal::Task<void> DeviceWatch::until_well() {
+  while (!well_) co_await back_.wait();
+}
+
+void DeviceWatch::note(std::string what) {
+  if (config_.tell) config_.tell(what);
+  if (notes_.size() < kNotesMax) notes_.push_back(std::move(what));
+}
+
+// What identifies a reason: details with numbers change all the time.
+std::string DeviceWatch::missing_names() const {
+  std::string text;
+  for (const NamedDevice& named : drivers_.devices()) {
+    if (!away(named)) continue;
+    text += named.role + ":";
+    if (config_.link_troubles)
+      for (const drivers::Trouble& trouble : config_.link_troubles(named.role))
+        text += std::string(trouble.fault->name) + ",";
+  }
+  return text;
+}
+
+std::string DeviceWatch::what_is_missing() const {
+  std::string text;
+  const auto add = [&](const drivers::Trouble& trouble) {
+    text += fmt::format(": {}{}{}; do: {}", trouble.fault->name, trouble.detail.empty() ? "" : ", ",
+                        trouble.detail, trouble.fault->remedy);
+  };
+  for (const NamedDevice& named : drivers_.devices()) {
+    if (!away(named)) continue;
+    text += fmt::format("{}{} ({} at {})", text.empty() ? "" : "; ", named.role,
+                        named.device->model(), named.link);
+    if (config_.link_troubles)
+      for (const drivers::Trouble& trouble : config_.link_troubles(named.role)) add(trouble);
+    for (const drivers::Trouble& trouble : named.device->troubles()) add(trouble);
+  }
+  return text;
+}
+
+hal::Task<hal::Result<void>> WatchedDrive::command(hal::Twist twist) {
+  watch_.look();
+  if (watch_.well()) {
+    auto done = co_await drive_.command(twist);
+    const bool lost = done.has_error() && (done.error() == errc::not_connected ||
+                                           done.error() == errc::operation_not_permitted);
+    if (!lost) co_return done;
+    co_await clock_.sleep_for(kTryAgain);  // It will show.
+    watch_.look();
+  } else {
+    const hal::Twist stand;
+    (void)co_await drive_.command(stand);  // Gone or not.
+  }
+  co_await watch_.until_well();
+  co_return hal::Result<void>{};
+}
+
+hal::Task<hal::Result<hal::WheelTravel>> WatchedDrive::next_travel() {
+  const auto next = [this] { return drive_.next_travel(); };
+  co_return co_await insist(watch_, clock_, next);
+}
+
+hal::Task<hal::Result<hal::ImuSample>> WatchedImu::next_sample() {
+  const auto next = [this] { return imu_.next_sample(); };
+  co_return co_await insist(watch_, clock_, next);
+}
+
+hal::Task<hal::Result<hal::GnssFix>> WatchedGnss::next_fix() {
+  const auto next = [this] { return gnss_.next_fix(); };
+  co_return co_await insist(watch_, clock_, next);
+}
+
+hal::Task<hal::Result<hal::ScanCloud>> WatchedScanner::scan() {
+  for (int tries = 1;; ++tries) {
+    co_await watch_.until_well();
+    auto cloud = co_await drivers_.scanner().scan();
+    if (cloud) co_return cloud;
+    const std::string& problem = drivers_.sweep().problem();
+    watch_.note(fmt::format("scan failed, try {} of {}: {}", tries, kTriesMax,
+                            problem.empty() ? cloud.error().message() : problem));
+    if (tries == kTriesMax) co_return cloud;
+    co_await clock_.sleep_for(kScanAgain);
+    watch_.look();
+  }
+}
+
+hal::Task<hal::Result<hal::SurveyedPose>> NobodyToPlace::place(std::string_view, hal::Pose2) {
+  co_return errc::make_error_code(errc::operation_not_supported);
+}
+
+}  // namespace mission

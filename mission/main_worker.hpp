@@ -1,0 +1,21 @@
+// Long computations on a thread of their own. Like main.cpp it may know everything.
+#pragma once
+
+#include <boost/asio/thread_pool.hpp>
+
+#include "hal/compute.hpp"
+
+namespace mission {
+
+// One computation at a time, in the order in which they were asked for; the event loop serves
+// devices meanwhile. Destroying it waits for the one that runs.
+class Worker final : public hal::Compute {
+ public:
+  ~Worker() override { thread_.join(); }
+  hal::Task<void> run(std::function<void()> work) override;
+
+ private:
+  boost::asio::thread_pool thread_{1};
+};
+
+}  // namespace mission
