@@ -59,7 +59,7 @@ class Survey {
   void merge(const hal::ScanCloud& cloud, const Stop& stop, ScanRecord& scan);
 
   std::vector<NextView> choose_views();
-  std::optional<std::size_t> choose_view(const std::vector<NextView>& views);
+  std::optional<std::size_t> choose_view(std::vector<NextView>& views);
   void note_leftover(bool stopped_for_gain);
   void drop(const Stop& stop, const std::string& reason);
   void close_roads(const std::vector<Eigen::Vector2d>& obstacles_m);
