@@ -1,7 +1,10 @@
 #include "mission/density_goal.hpp"
 
 #include <algorithm>
+#include <array>
 #include <numbers>
+
+#include "planning/voxel_parallel.hpp"
 
 namespace mission {
 
@@ -28,17 +31,51 @@ std::size_t DensityGoal::index(planning::Voxel v) const {
 void DensityGoal::add(const planning::VoxelMap& map, const hal::ScanPattern& pattern,
                       const Eigen::Isometry3d& T_W_S) {
   if (!is_set()) return;
+  scans_.emplace_back(map.grid(), pattern, T_W_S, limits_);
+  find_reached(map);
+}
+
+void DensityGoal::restore(const planning::VoxelMap& map, const std::vector<PastScan>& scans,
+                          const std::vector<planning::Voxel>& set_aside) {
+  if (!is_set()) return;
+  for (const PastScan& scan : scans)
+    scans_.emplace_back(map.grid(), scan.pattern, scan.T_W_S, limits_);
+  for (const planning::Voxel& v : set_aside) tries_[v] = kTriesMax;
+  find_reached(map);
+}
+
+std::vector<planning::Voxel> DensityGoal::set_aside() const {
+  std::vector<planning::Voxel> voxels;
+  for (const auto& [v, tries] : tries_)
+    if (tries >= kTriesMax) voxels.push_back(v);
+  std::ranges::sort(voxels, {}, [](const planning::Voxel& v) { return std::array{v.z, v.y, v.x}; });
+  return voxels;
+}
+
+void DensityGoal::find_reached(const planning::VoxelMap& map) {
   nx_ = static_cast<std::size_t>(map.grid().nx);
   ny_ = static_cast<std::size_t>(map.grid().ny);
-  best_ppm2_.resize(map.grid().size());
+  scan_of_.resize(map.grid().size());
   all_ = planning::surface_voxels(map);
-  const std::vector<float> now =
-      planning::scan_density(map, all_, pattern, T_W_S, limits_, threads_);
-  for (std::size_t i = 0; i < all_.size(); ++i) {
-    float& best_ppm2 = best_ppm2_[index(all_[i].v)];
-    best_ppm2 = std::max(best_ppm2, now[i]);
-  }
+  planning::for_pieces(threads_, all_.size(), 256, [&](int, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      scan_of_[index(all_[i].v)] = scan_that_reaches(map, all_[i]);
+  });
   find_thin();
+}
+
+// The one that did before, else the last that does.
+std::uint32_t DensityGoal::scan_that_reaches(const planning::VoxelMap& map,
+                                             const planning::BoundaryVoxel& u) const {
+  const auto goal_ppm2 = static_cast<float>(goal_ppm2_);
+  const auto reaches = [&](std::uint32_t scan) {
+    return scans_[scan - 1].on(map, u, goal_ppm2) >= goal_ppm2;
+  };
+  const std::uint32_t before = scan_of_[index(u.v)];
+  if (before != 0 && reaches(before)) return before;
+  for (auto scan = static_cast<std::uint32_t>(scans_.size()); scan > 0; --scan)
+    if (scan != before && reaches(scan)) return scan;
+  return 0;
 }
 
 void DensityGoal::find_thin() {

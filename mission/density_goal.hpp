@@ -15,8 +15,10 @@ namespace mission {
 // Limits of range and angle, and for density with the goal (0: without).
 planning::ViewLimits view_limits(const ScannerConfig& scanner, double density_min_ppm2 = 0);
 
-// The density reached so far, the best of all scans per voxel, as expected at the time of each scan
-// (planning/scan_density.hpp). Takes 4 bytes per voxel of the box, nothing without a goal.
+// Which surface voxels have the density: those on which, as the map stands, some scan so far puts
+// as many points (planning/scan_density.hpp). It follows from map and scans alone: a scan also
+// counts for faces that a later one lays open, and no longer for what a later one finds to be
+// hidden. Takes 4 bytes per voxel of the box, nothing without a goal.
 class DensityGoal {
  public:
   // goal_ppm2 0: no goal, and nothing is ever thin.
@@ -25,9 +27,19 @@ class DensityGoal {
   bool is_set() const { return goal_ppm2_ > 0; }
   const planning::ViewLimits& limits() const { return limits_; }  // Of views that reach it.
 
-  // After the scan is in the map. The box may have grown in z since the last one.
+  // After the scan is in the map. The box may have grown in z since the last one. For most voxels
+  // the scan that sufficed before is asked again; only for the others all are.
   void add(const planning::VoxelMap& map, const hal::ScanPattern& pattern,
            const Eigen::Isometry3d& T_W_S);
+  // All scans of an earlier run, in the map that it left behind, and what it had set aside.
+  struct PastScan {
+    hal::ScanPattern pattern;
+    Eigen::Isometry3d T_W_S;
+  };
+  void restore(const planning::VoxelMap& map, const std::vector<PastScan>& scans,
+               const std::vector<planning::Voxel>& set_aside);
+  // What was tried in vain, ordered by z, then y, then x.
+  std::vector<planning::Voxel> set_aside() const;
 
   // Surface voxels below the goal that views have not tried for tries_max times in vain: what is
   // worth seeing again for a view that reaches the goal. Ordered by z, then y, then x.
@@ -44,17 +56,19 @@ class DensityGoal {
  private:
   static constexpr int kTriesMax = 2;
 
-  bool reached(planning::Voxel v) const {
-    return best_ppm2_[index(v)] >= static_cast<float>(goal_ppm2_);
-  }
+  bool reached(planning::Voxel v) const { return scan_of_[index(v)] != 0; }
   std::size_t index(planning::Voxel v) const;
+  void find_reached(const planning::VoxelMap& map);
+  std::uint32_t scan_that_reaches(const planning::VoxelMap& map,
+                                  const planning::BoundaryVoxel& u) const;
   void find_thin();
 
   planning::ViewLimits limits_;
   double goal_ppm2_;
   int threads_;
   std::size_t nx_{}, ny_{};
-  std::vector<float> best_ppm2_;
+  std::vector<planning::ScanDensity> scans_;
+  std::vector<std::uint32_t> scan_of_;  // Per voxel: one that reaches the goal, from 1; 0: none.
   std::vector<planning::BoundaryVoxel> all_, thin_;  // Of the surface.
   std::vector<planning::Voxel> expected_;
   std::map<planning::Voxel, int> tries_;  // Of those that a view did not bring to the goal.

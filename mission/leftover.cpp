@@ -53,13 +53,13 @@ std::string in_words(const Leftover& left) {
     return fmt::format(
         "proven: even if everything unseen were air, no view would see more than {} unseen voxels "
         "of the box",
-        certificate.optimistic_max());
+        certificate.optimistic_voxels());
   if (certificate.proven()) return "not proven: what hides voxels now may turn out to be foliage";
   const Eigen::Vector2d at_m = left.optimistic_at_m.value_or(Eigen::Vector2d::Zero());
   return fmt::format(
-      "not proven: if everything unseen were air, up to {} unseen voxels might be seen from "
+      "not proven: if everything unseen were air, {} unseen voxels would be seen from "
       "({:.1f}, {:.1f})",
-      certificate.optimistic_max(), at_m.x(), at_m.y());
+      certificate.optimistic_voxels(), at_m.x(), at_m.y());
 }
 
 std::optional<double> seen_of_visible(const VoxelCounts& counts, const Leftover& left) {
@@ -76,7 +76,7 @@ json::value leftover_json(const RunRecord& record) {
     reasons[planning::name(static_cast<planning::ViewVerdict>(i))] = left.never_visible[i];
   const planning::StopCertificate& certificate = left.certificate;
   return {{"pessimistic_max_voxels", certificate.pessimistic_max()},
-          {"optimistic_max_voxels", certificate.optimistic_max()},
+          {"optimistic_voxels", certificate.optimistic_voxels()},
           {"threshold_voxels", certificate.threshold_voxels},
           {"proven", left.proven()},
           {"never_visible_voxels", left.never_visible_voxels()},

@@ -26,10 +26,17 @@ struct PastSummary {
   std::string site;
   int gain_min_voxels{};
   double scanner_height_m{}, range_min_m{}, range_max_m{}, grazing_max_deg{};
+  double fov_deg{}, azimuth_step_deg{}, elevation_step_deg{};  // Of the scanner.
+  double density_min_ppm2{};
+  bool foliage{};
+  double foliage_share_min{};
   double radius_m{};  // Of the robot.
   double margin_m{};  // MissionConfig::margin_m
   std::vector<AskedView> asked;
-  std::vector<std::uint64_t> set_aside;  // As SiteModel::voxels_set_aside.
+  std::vector<std::uint64_t> set_aside;       // As SiteModel::voxels_set_aside,
+  std::vector<std::uint64_t> thin_set_aside;  // thin_set_aside
+  std::vector<std::uint64_t> foliage_voxels;  // and foliage.
+  std::vector<DensityGoal::PastScan> scans;
 };
 
 struct PastRun {
@@ -52,8 +59,10 @@ void adopt(const PastRun& run, MissionConfig& config);
 // run's; one sentence each.
 std::vector<std::string> differences(const PastRun& run, const MissionConfig& config);
 
-// The model as the run left it: cells asked for and voxels set aside are so again. Throws
-// std::invalid_argument when the map is not of this site and mission (SiteModel).
+// The model as the run left it: cells asked for and voxels set aside are so again, foliage is
+// looked through if the config asks for it, and surfaces have the points that the run's scans put
+// on them, for whatever goal the config has. Throws std::invalid_argument when the map is not of
+// this site and mission (SiteModel).
 SiteModel model_of(const PastRun& run, const MissionConfig& config, const nav::SiteMap& map,
                    const std::vector<AreaTask>& tasks, int threads);
 

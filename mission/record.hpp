@@ -40,7 +40,8 @@ struct ScanRecord {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // Of (x m, y m, heading rad), in W.
   std::optional<hal::Pose2> truth;                       // In simulation.
   double ground_z_m{};
-  double start_s{};  // Mission time.
+  hal::ScanPattern pattern;  // Of its beams.
+  double start_s{};          // Mission time.
   double end_s{};
   double driven_m{};  // On the way here.
   std::uint64_t beams{};
@@ -85,7 +86,7 @@ struct GnssCounts {
 // What Phase II leaves at its end, and why.
 struct Leftover {
   planning::StopCertificate certificate;
-  std::optional<Eigen::Vector2d> optimistic_at_m;  // From where its optimistic maximum is seen.
+  std::optional<Eigen::Vector2d> optimistic_at_m;  // From where its optimistic count is seen.
   bool foliage{};  // What blocks now may be found to be foliage later: then nothing is proven.
   // Boundary unseen voxels that no cell can see as the map stands (roofs, pockets: work for a mast
   // or a drone), by planning::ViewVerdict.
@@ -133,11 +134,17 @@ struct RunRecord {
   planning::VoxelGrid grid;
   double voxel_m{};
   int gain_min_voxels{};
+  // Of [phase2].
+  double density_min_ppm2{};
+  bool looks_through_foliage{};
+  double foliage_share_min{};
   GnssCounts gnss;
   double mission_s{};
   double driven_total_m{};
-  std::vector<std::uint64_t> set_aside;  // SiteModel::voxels_set_aside at the end.
-  std::string end;                       // Why it ended, in words.
+  std::vector<std::uint64_t> set_aside;       // SiteModel::voxels_set_aside at the end,
+  std::vector<std::uint64_t> thin_set_aside;  // thin_set_aside
+  std::vector<std::uint64_t> foliage;         // and foliage.
+  std::string end;                            // Why it ended, in words.
   bool completed{};
   std::optional<Leftover> leftover;
   DensityFacts density;

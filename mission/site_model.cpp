@@ -25,6 +25,9 @@ constexpr float kObstacleRangeMaxM = 40.0F;
 constexpr std::int64_t kKnownWallMarginMm = 600;
 constexpr std::uint8_t kObstacleHitsMin = 4;
 
+// How far a wall may stand from where map and pose put it, as seen by the scanner.
+constexpr double kWallsMarginM = 0.15;
+
 struct Bounds {
   Eigen::Vector2d low{1e18, 1e18}, high{-1e18, -1e18};
 
@@ -74,6 +77,13 @@ void check_box(const planning::VoxelGrid& grid, const planning::VoxelGrid& wante
 
 }  // namespace
 
+Eigen::Isometry3d scanner_pose(const hal::Pose2& pose, double ground_z_m, double height_m) {
+  Eigen::Isometry3d T_W_S = Eigen::Isometry3d::Identity();
+  T_W_S.translation() << pose.position_m, ground_z_m + height_m;
+  T_W_S.linear() = Eigen::AngleAxisd(pose.heading_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  return T_W_S;
+}
+
 planning::VoxelGrid voxel_grid(const MissionConfig& config, const nav::SiteMap& map,
                                const std::vector<AreaTask>& tasks) {
   const double voxel_m = config.phase2.voxel_m;
@@ -115,6 +125,8 @@ SiteModel::SiteModel(const MissionConfig& config, const nav::SiteMap& map,
   const planning::VoxelGrid& grid = map_.grid();
   const nav::RasterGrid columns{grid.W_min_m.head<2>(), grid.voxel_m, grid.nx, grid.ny};
   in_site_ = nav::rasterize(map.boundary, columns);
+  for (const nav::SegmentMm& wall : nav::edges(map.obstacles))
+    walls_.push_back({nav::to_m(wall.a), nav::to_m(wall.b)});
   find_ground(columns);
   excluded_.assign(cells_.size(), 0);
   obstacle_grid_ = {grid.W_min_m.head<2>(), kObstacleCellM,
@@ -196,6 +208,8 @@ ScanEffect SiteModel::add(const hal::ScanCloud& scan,
   insert.range_max_m = config_.robot.scanner.range_max_m;
   insert.carve_no_return = config_.phase2.carve_no_return;
   insert.ground_z_m = ground_z_m;
+  insert.walls = walls_;
+  insert.walls_margin_m = kWallsMarginM;
   insert.threads = threads_;
   const planning::InsertReport report = map_.insert(scan, T_W_S, insert);
   if (beams_) beams_->add(scan, T_W_S, insert);
@@ -296,23 +310,21 @@ std::vector<CellTally> SiteModel::tally() {
   for (std::size_t i = 0; i < cells_.size(); ++i)
     if (!excluded_[i] && planner_map().at(cells_[i].voxel) == planning::VoxelState::seen_empty)
       open.push_back({cells_[i], 0});
-  const std::vector<std::uint32_t>& counts =
-      tally_.update(planner_map(), worth_seeing(), voxels_of(open));
+  const std::vector<planning::Voxel> voxels = voxels_of(open);
+  const std::vector<std::uint32_t>& counts = tally_.update(planner_map(), worth_seeing(), voxels);
   for (std::size_t i = 0; i < open.size(); ++i) open[i].voxels = counts[i];
+  if (!density_.is_set()) return open;
+  const std::vector<std::uint32_t> thin =
+      planning::tally(planner_map(), density_.thin(), voxels, density_.limits(), threads_);
+  for (std::size_t i = 0; i < open.size(); ++i) open[i].voxels += thin[i];
   return open;
 }
 
 std::vector<NextView> SiteModel::next_views() {
   last_tally_ = tally();
-  std::vector<std::uint32_t> thin(last_tally_.size());
-  if (density_.is_set())
-    thin = planning::tally(planner_map(), density_.thin(), voxels_of(last_tally_),
-                           density_.limits(), threads_);
   best_voxels_ = 0;
   std::vector<NextView> views;
-  for (std::size_t i = 0; i < last_tally_.size(); ++i) {
-    const ViewCell& cell = last_tally_[i].cell;
-    const std::uint32_t voxels = last_tally_[i].voxels + thin[i];
+  for (const auto& [cell, voxels] : last_tally_) {
     best_voxels_ = std::max<std::uint64_t>(best_voxels_, voxels);
     if (voxels < static_cast<std::uint32_t>(config_.phase2.gain_min_voxels)) continue;
     views.push_back({.cell = cell,
@@ -328,12 +340,17 @@ std::vector<ViewAhead> SiteModel::views_ahead(const std::vector<CellTally>& tall
                                               std::size_t count) const {
   std::vector<std::uint32_t> counts;
   for (const CellTally& at : tallies) counts.push_back(at.voxels);
+  std::vector<planning::ViewTargets> targets{{worth_seeing(), view_limits(config_.robot.scanner)}};
+  if (density_.is_set()) targets.push_back({density_.thin(), density_.limits()});
   std::vector<ViewAhead> views;
   for (const planning::PlannedView& view :
-       planning::next_views(planner_map(), worth_seeing(), voxels_of(tallies), counts,
-                            view_limits(config_.robot.scanner),
-                            {.views_max = count, .adds_min_voxels = 1, .threads = threads_}))
-    views.push_back({tallies[view.candidate].cell, view.sees_voxels, view.adds_voxels});
+       planning::next_views(planner_map(), std::move(targets), voxels_of(tallies), counts,
+                            {.views_max = count,
+                            .adds_min_voxels = 1,
+                            .threads = threads_,
+                            .fov_deg = config_.robot.scanner.fov_deg}))
+    views.push_back(
+        {tallies[view.candidate].cell, view.sees_voxels, view.adds_voxels, view.heading_rad});
   return views;
 }
 
@@ -350,27 +367,61 @@ std::uint64_t SiteModel::settle() {
   return resolved;
 }
 
-std::vector<std::uint64_t> SiteModel::voxels_set_aside() const {
+std::uint64_t SiteModel::number_of(const planning::Voxel& v) const {
   const auto nx = static_cast<std::uint64_t>(map_.grid().nx);
   const auto ny = static_cast<std::uint64_t>(map_.grid().ny);
+  return (static_cast<std::uint64_t>(v.z) * ny + static_cast<std::uint64_t>(v.y)) * nx +
+         static_cast<std::uint64_t>(v.x);
+}
+
+planning::Voxel SiteModel::numbered(std::uint64_t number) const {
+  const auto nx = static_cast<std::uint64_t>(map_.grid().nx);
+  const auto ny = static_cast<std::uint64_t>(map_.grid().ny);
+  return {static_cast<int>(number % nx), static_cast<int>(number / nx % ny),
+          static_cast<int>(number / nx / ny)};
+}
+
+std::vector<std::uint64_t> SiteModel::voxels_set_aside() const {
   std::vector<std::uint64_t> voxels;
   for (const auto& [v, tries] : tries_)
-    if (tries >= kTriesMax)
-      voxels.push_back((static_cast<std::uint64_t>(v.z) * ny + static_cast<std::uint64_t>(v.y)) *
-                           nx +
-                       static_cast<std::uint64_t>(v.x));
+    if (tries >= kTriesMax) voxels.push_back(number_of(v));
   std::ranges::sort(voxels);
   return voxels;
 }
 
 void SiteModel::set_aside(const std::vector<std::uint64_t>& voxels) {
-  const auto nx = static_cast<std::uint64_t>(map_.grid().nx);
-  const auto ny = static_cast<std::uint64_t>(map_.grid().ny);
-  for (const std::uint64_t i : voxels) {
-    const planning::Voxel v{static_cast<int>(i % nx), static_cast<int>(i / nx % ny),
-                            static_cast<int>(i / nx / ny)};
-    if (std::exchange(tries_[v], kTriesMax) < kTriesMax) ++set_aside_;
+  for (const std::uint64_t i : voxels)
+    if (std::exchange(tries_[numbered(i)], kTriesMax) < kTriesMax) ++set_aside_;
+}
+
+std::vector<std::uint64_t> SiteModel::thin_set_aside() const {
+  std::vector<std::uint64_t> voxels;
+  for (const planning::Voxel& v : density_.set_aside()) voxels.push_back(number_of(v));
+  return voxels;
+}
+
+std::vector<std::uint64_t> SiteModel::foliage() const {
+  std::vector<std::uint64_t> voxels;
+  const planning::VoxelGrid& grid = map_.grid();
+  for (int z = 0; see_through_ && z < grid.nz; ++z)
+    for (int y = 0; y < grid.ny; ++y)
+      for (int x = 0; x < grid.nx; ++x)
+        if (see_through_->at({x, y, z}) != map_.at({x, y, z}))
+          voxels.push_back(number_of({x, y, z}));
+  return voxels;
+}
+
+void SiteModel::restore(const std::vector<std::uint64_t>& foliage,
+                        const std::vector<DensityGoal::PastScan>& scans,
+                        const std::vector<std::uint64_t>& thin_set_aside) {
+  if (config_.phase2.foliage) {
+    see_through_ = map_;
+    for (const std::uint64_t i : foliage)
+      see_through_->set(numbered(i), planning::VoxelState::seen_empty);
   }
+  std::vector<planning::Voxel> thin;
+  for (const std::uint64_t i : thin_set_aside) thin.push_back(numbered(i));
+  density_.restore(planner_map(), scans, thin);
 }
 
 void SiteModel::exclude(const planning::Voxel& cell) {

@@ -25,6 +25,9 @@ namespace mission {
 planning::VoxelGrid voxel_grid(const MissionConfig& config, const nav::SiteMap& map,
                                const std::vector<AreaTask>& tasks);
 
+// Of a scanner that stands upright, height_m above level ground.
+Eigen::Isometry3d scanner_pose(const hal::Pose2& pose, double ground_z_m, double height_m);
+
 // A place where a next best view may be taken.
 struct ViewCell {
   planning::Voxel voxel;  // Holds the scanner.
@@ -33,6 +36,7 @@ struct ViewCell {
 
 struct CellTally {
   ViewCell cell;
+  // Boundary unseen, all around; with a density goal also surface voxels to be brought there.
   std::uint32_t voxels{};
 };
 
@@ -42,6 +46,8 @@ struct NextView {
   hal::Pose2 pose;
   double ground_z_m{};
   std::uint32_t voxels{};  // With a density goal: and surface voxels that it would bring there.
+  // false: pose.heading_rad is not worked out yet, and voxels is what it would see all around.
+  bool faced = true;
 };
 
 // One of several views to come.
@@ -49,6 +55,7 @@ struct ViewAhead {
   ViewCell cell;
   std::uint32_t sees_voxels{};
   std::uint32_t adds_voxels{};  // Seen by none of those before it.
+  double heading_rad{};         // Of a scanner that does not see all around.
 };
 
 // What one scan did to the model.
@@ -75,20 +82,23 @@ class SiteModel {
   ScanEffect add(const hal::ScanCloud& scan, const std::vector<Eigen::Vector3f>& W_points_m,
                  const Eigen::Isometry3d& T_W_S, double ground_z_m);
 
-  // Every cell that a view may be asked for, and how many boundary unseen voxels it counts.
+  // Every cell that a view may be asked for, and what it counts.
   std::vector<CellTally> tally();
+  // The same from the best heading of each cell: what a view there would see.
+  std::vector<CellTally> faced_tally();
 
   // Candidates by gain, best first, ties to the lowest index; those below the threshold are left
   // out. Empty: no view would add enough. best_voxels() tells the maximum all the same.
-  // A scanner that does not see all around faces where it sees the most (site_facing.cpp).
+  // A scanner that does not see all around faces where it sees the most (site_facing.cpp): headings
+  // are worked out until the best is known. Then views that see enough come first, and those that
+  // might follow, not faced, by what they would see all around.
   std::vector<NextView> next_views();
-  // Whether next_views() left out some that may also see enough: ask again when none can be
-  // reached.
-  bool views_left_out() const { return views_left_out_; }
+  // Works out the heading of a view and what it sees then, as the map stands.
+  void face(NextView& view) const;
   std::uint64_t best_voxels() const { return best_voxels_; }
 
-  // The next `count` views at once, threshold and density aside (planning::next_views); `tallies`
-  // is tally(), last_tally() that of next_views().
+  // The next `count` views at once, threshold aside (planning::next_views); `tallies` is tally(),
+  // last_tally() that of next_views().
   std::vector<ViewAhead> views_ahead(const std::vector<CellTally>& tallies,
                                      std::size_t count) const;
   const std::vector<CellTally>& last_tally() const { return last_tally_; }
@@ -106,6 +116,15 @@ class SiteModel {
   // Which voxels are set aside, as index x + nx (y + ny z), and the same taken up again.
   std::vector<std::uint64_t> voxels_set_aside() const;
   void set_aside(const std::vector<std::uint64_t>& voxels);
+  // Likewise the surface voxels that views did not bring to the density goal, and what views look
+  // through though it is seen-occupied: foliage.
+  std::vector<std::uint64_t> thin_set_aside() const;
+  std::vector<std::uint64_t> foliage() const;
+  // With the map of an earlier run: takes up the foliage that it found, if that is asked for, and
+  // which surfaces its scans brought to the density goal.
+  void restore(const std::vector<std::uint64_t>& foliage,
+               const std::vector<DensityGoal::PastScan>& scans,
+               const std::vector<std::uint64_t>& thin_set_aside);
 
   // Never ask for a view from this cell again.
   void exclude(const planning::Voxel& cell);
@@ -141,9 +160,13 @@ class SiteModel {
   void look_through();
   void find_boundary();
   std::vector<NextView> faced(std::vector<NextView> views);
+  std::vector<planning::Voxel> worth_in_sight(const std::vector<planning::BoundaryVoxel>& worth,
+                                              const planning::Voxel& cell) const;
   std::vector<planning::Voxel> unseen_in_sight(const std::vector<planning::BoundaryVoxel>& worth,
                                                const planning::Voxel& cell) const;
   std::vector<planning::Voxel> standing_cells() const;
+  std::uint64_t number_of(const planning::Voxel& v) const;
+  planning::Voxel numbered(std::uint64_t number) const;
   bool is_in_site(const planning::Voxel& v) const;
   bool is_set_aside(const planning::Voxel& v) const;
   void note_obstacle(const Eigen::Vector3f& W_point_m, double ground_z_m, ScanEffect& effect);
@@ -155,6 +178,7 @@ class SiteModel {
   planning::RunningTally tally_;
   std::vector<planning::BoundaryVoxel> boundary_;  // Within the site's boundary only.
   std::vector<std::uint8_t> in_site_;              // Per column of voxels.
+  std::vector<planning::WallLine> walls_;          // Of the map.
   std::vector<planning::Voxel> ground_;            // Hold the mapped ground; never seen-empty.
   std::vector<ViewCell> cells_;
   std::map<planning::Voxel, int> tries_;      // Of those that a view did not resolve.
@@ -167,7 +191,6 @@ class SiteModel {
   DensityGoal density_;
   std::vector<CellTally> last_tally_;
   std::uint64_t best_voxels_{};
-  bool views_left_out_{};
   std::uint64_t set_aside_{};
 
   nav::RasterGrid obstacle_grid_;

@@ -98,6 +98,21 @@ json::object coverage_json(const RunRecord& record) {
   return coverage;
 }
 
+// Not rounded, so that what a scan saw can be worked out again as it was.
+json::object seen_from_json(const ScanRecord& scan) {
+  const hal::ScanPattern& pattern = scan.pattern;
+  return {{"x_m", scan.believed.position_m.x()},
+          {"y_m", scan.believed.position_m.y()},
+          {"ground_z_m", scan.ground_z_m},
+          {"heading_rad", scan.believed.heading_rad},
+          {"azimuth_first_rad", pattern.azimuth_first_rad},
+          {"azimuth_step_rad", pattern.azimuth_step_rad},
+          {"elevation_first_rad", pattern.elevation_first_rad},
+          {"elevation_step_rad", pattern.elevation_step_rad},
+          {"columns", pattern.columns},
+          {"rows", pattern.rows}};
+}
+
 json::object scan_json(const RunRecord& record, std::size_t index) {
   const ScanRecord& scan = record.scans[index];
   json::object object{{"number", scan.number},
@@ -118,6 +133,7 @@ json::object scan_json(const RunRecord& record, std::size_t index) {
                       {"points", scan.points},
                       {"points_outside_box", scan.points_outside_box}};
   if (scan.truth) object["truth"] = pose_json(*scan.truth);
+  object["seen_from"] = seen_from_json(scan);
   if (scan.next_best_view) {
     object["predicted_voxels"] = scan.predicted_voxels;
     object["resolved_voxels"] = scan.resolved_voxels;
@@ -189,6 +205,9 @@ json::object sensor_json(const ScannerConfig& scanner) {
           {"range_min_m", scanner.range_min_m},
           {"range_max_m", scanner.range_max_m},
           {"grazing_max_deg", scanner.grazing_max_deg},
+          {"fov_deg", scanner.fov_deg},
+          {"azimuth_step_deg", scanner.azimuth_step_deg},
+          {"elevation_step_deg", scanner.elevation_step_deg},
           {"elevation_min_deg", scanner.elevation_min_deg},
           {"elevation_max_deg", scanner.elevation_max_deg}};
 }
@@ -219,7 +238,12 @@ json::object summarise(const RunRecord& record, const ProductFacts& products) {
   summary["radius_m"] = record.radius_m;
   summary["margin_m"] = record.margin_m;
   summary["grid"] = grid_json(record.grid);
+  summary["density_min_ppm2"] = record.density_min_ppm2;
+  summary["foliage"] = record.looks_through_foliage;
+  summary["foliage_share_min"] = record.foliage_share_min;
   summary["voxels_set_aside"] = json::value_from(record.set_aside);
+  summary["voxels_thin_set_aside"] = json::value_from(record.thin_set_aside);
+  summary["voxels_foliage"] = json::value_from(record.foliage);
   summary["counts"] = counts_json(record);
   summary["coverage"] = coverage_json(record);
   summary["voxels"] =

@@ -19,14 +19,6 @@ json::object pose_json(const hal::Pose2& pose) {
           {"heading_deg", pose.heading_rad * 180 / std::numbers::pi}};
 }
 
-// The scanner stands upright at its height above the ground.
-Eigen::Isometry3d scanner_pose(const hal::Pose2& pose, double ground_z_m, double height_m) {
-  Eigen::Isometry3d T_W_S = Eigen::Isometry3d::Identity();
-  T_W_S.translation() << pose.position_m, ground_z_m + height_m;
-  T_W_S.linear() = Eigen::AngleAxisd(pose.heading_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  return T_W_S;
-}
-
 // The covariance in two numbers: along the worse axis, and of the heading.
 void note_sigmas(ScanRecord& scan) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(scan.covariance.topLeftCorner<2, 2>());
@@ -89,6 +81,9 @@ Survey::Survey(const MissionConfig& config, const nav::SiteMap& map, SiteTasks t
   layers_at_first_ = record_.grid.nz;
   record_.voxel_m = config.phase2.voxel_m;
   record_.gain_min_voxels = config.phase2.gain_min_voxels;
+  record_.density_min_ppm2 = config.phase2.density_min_ppm2;
+  record_.looks_through_foliage = config.phase2.foliage;
+  record_.foliage_share_min = config.phase2.foliage_share_min;
 }
 
 hal::Task<void> Survey::run() {
@@ -104,6 +99,8 @@ hal::Task<void> Survey::run() {
   record_.mission_s = now_s();
   note_gnss();
   record_.set_aside = model_.voxels_set_aside();
+  record_.thin_set_aside = model_.thin_set_aside();
+  record_.foliage = model_.foliage();
   decide({{"t_s", now_s()},
           {"decision", "end"},
           {"completed", record_.completed},
@@ -207,9 +204,10 @@ hal::Task<void> Survey::refine() {
       co_await leave(std::move(reason), true);
       co_return;
     }
-    const bool done = co_await take_best_of(std::move(views));
+    const bool done = co_await take_best_of(views);
     views_taken_ += done;
-    if (!done && !model_.views_left_out()) {
+    const bool some_not_faced = config_.phase2.choose == "gain" && !views.empty();
+    if (!done && !some_not_faced) {
       std::string reason = "none of the views that would add enough can be reached";
       co_await leave(std::move(reason), false);
       co_return;
@@ -219,8 +217,8 @@ hal::Task<void> Survey::refine() {
   co_await leave(std::move(reason), false);
 }
 
-// The best that can be reached; the others stay excluded. False: none can.
-hal::Task<bool> Survey::take_best_of(std::vector<NextView> views) {
+// The best that can be reached; those tried stay excluded, and leave the views. False: none can.
+hal::Task<bool> Survey::take_best_of(std::vector<NextView>& views) {
   for (;;) {
     std::optional<std::size_t> chosen;
     const std::function<void()> choose = [&, from_m = Eigen::Vector2d(pilot_.pose().position_m)] {
@@ -335,6 +333,7 @@ void Survey::merge(const hal::ScanCloud& cloud, const Stop& stop, ScanRecord& sc
   const ScanEffect effect = model_.add(cloud, W_points_m, T_W_S, scan.ground_z_m);
   if (stop.view) scan.resolved_voxels = model_.settle();
   scan.beams = cloud.pattern.beams();
+  scan.pattern = cloud.pattern;
   scan.points = W_points_m.size();
   scan.points_outside_box = effect.points_outside_box;
   scan.after = model_.counts();

@@ -64,9 +64,9 @@ class Survey {
   void merge(const hal::ScanCloud& cloud, const Stop& stop, ScanRecord& scan);
 
   std::vector<NextView> choose_views();
-  std::optional<std::size_t> choose_view(const std::vector<NextView>& views,
+  std::optional<std::size_t> choose_view(std::vector<NextView>& views,
                                          const Eigen::Vector2d& from_m);
-  hal::Task<bool> take_best_of(std::vector<NextView> views);
+  hal::Task<bool> take_best_of(std::vector<NextView>& views);
   hal::Task<void> leave(std::string reason, bool stopped_for_gain);
   void note_leftover(bool stopped_for_gain);
   void drop(const Stop& stop, const std::string& reason);

@@ -1,4 +1,6 @@
 // How a survey chooses its next best views, and what it says when it stops.
+#include <algorithm>
+
 #include "mission/leftover.hpp"
 #include "mission/survey.hpp"
 #include "mission/view_times.hpp"
@@ -24,7 +26,7 @@ void Survey::note_leftover(bool stopped_for_gain) {
   decide({{"t_s", now_s()},
           {"decision", "stop_certificate"},
           {"pessimistic_max", certificate.pessimistic_max()},
-          {"optimistic_max", certificate.optimistic_max()},
+          {"optimistic_voxels", certificate.optimistic_voxels()},
           {"threshold", certificate.threshold_voxels},
           {"proven", left.proven()},
           {"never_visible", left.never_visible_voxels()}});
@@ -35,27 +37,33 @@ std::vector<NextView> Survey::choose_views() {
   if (!record_.scans.empty()) record_.scans.back().visible_to_next = model_.best_voxels();
   json::array ahead;
   for (const ViewAhead& view : model_.views_ahead(
-           model_.last_tally(), static_cast<std::size_t>(config_.phase2.views_ahead)))
-    ahead.push_back({{"area", task(view.cell.task).area.name},
-                     {"at_m", xy(model_.cell_position_m(view.cell).head<2>())},
-                     {"sees_voxels", view.sees_voxels},
-                     {"adds_voxels", view.adds_voxels}});
+           model_.last_tally(), static_cast<std::size_t>(config_.phase2.views_ahead))) {
+    json::object object{{"area", task(view.cell.task).area.name},
+                        {"at_m", xy(model_.cell_position_m(view.cell).head<2>())},
+                        {"sees_voxels", view.sees_voxels},
+                        {"adds_voxels", view.adds_voxels}};
+    if (config_.robot.scanner.fov_deg < 360) object["heading_rad"] = view.heading_rad;
+    ahead.push_back(std::move(object));
+  }
   decide({{"t_s", now_s()},
           {"decision", "next_best_view"},
           {"best_voxels", model_.best_voxels()},
           {"gain_min_voxels", config_.phase2.gain_min_voxels},
-          {"views_above", views.size()},
+          {"views_above", std::ranges::count_if(views, &NextView::faced)},
           {"ahead", std::move(ahead)}});
   return views;
 }
 
-std::optional<std::size_t> Survey::choose_view(const std::vector<NextView>& views,
+std::optional<std::size_t> Survey::choose_view(std::vector<NextView>& views,
                                                const Eigen::Vector2d& from_m) {
   const nav::Roadmap* roads = tasks_.start_area < 0
                                   ? nullptr
                                   : &roads_[static_cast<std::size_t>(tasks_.start_area)].roadmap();
   const ViewTimes times(config_, tasks_, roads, from_m);
-  const auto chosen = choose(views, times, config_.phase2.choose == "gain_per_minute");
+  const auto chosen = choose(
+      views, times, config_.phase2.choose == "gain_per_minute",
+      [this](NextView& view) { model_.face(view); },
+      static_cast<std::uint32_t>(config_.phase2.gain_min_voxels));
   if (!chosen) return std::nullopt;
   const NextView& view = views[chosen->view];
   json::object decision{{"t_s", now_s()},

@@ -1,17 +1,21 @@
 // What the next view costs in time, and which to take ([phase2] choose). Pure.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <vector>
 
 #include "mission/config.hpp"
 #include "mission/plan.hpp"
 #include "mission/site_model.hpp"
+#include "nav/roadmap.hpp"
+#include "planning/next_views.hpp"
 #include "planning/view_rate.hpp"
 
 namespace mission {
 
-// A view, how long it takes from where the robot stands, and what it brings per minute.
+// A view, how long it takes from where the robot stands, and what it brings per minute. The view
+// itself is faced.
 struct ChosenView {
   std::size_t view{};  // Index into the views.
   // Road at full speed, or carrying and setting up; and the scan. Empty: no way there is known.
@@ -41,10 +45,32 @@ class ViewTimes {
   Eigen::Vector2d robot_m_;
 };
 
+struct ViewPlace {
+  int task{};  // Index into the tasks.
+  Eigen::Vector2d at_m{0, 0};
+};
+
+// In which order to visit places: by the shortest way along the roads, and then those to which no
+// road leads (a person carries the scanner there), as they are.
+struct ViewTrip {
+  std::vector<std::size_t> order;  // Indices into the places.
+  std::size_t by_road{};           // So many of them, first.
+  double road_m{};                 // From where the robot stands to the last of these.
+};
+
+// roads: as for ViewTimes. Proven shortest for up to 14 places by road.
+ViewTrip shortest_trip(const std::vector<ViewPlace>& places, int start_area,
+                       const nav::Roadmap* roads, const Eigen::Vector2d& robot_m);
+
+// Works out where a view faces and what it then sees.
+using FaceView = std::function<void(NextView&)>;
+
 // Of views ordered by gain: "gain" takes the first, "gain_per_minute" the one of the highest rate
-// (ties: the first), asking for as few roads as possible. Nothing if there is none, or none that
-// can be reached for a rate.
-std::optional<ChosenView> choose(const std::vector<NextView>& views, const ViewTimes& times,
-                                 bool per_minute);
+// (ties: the first), asking for as few roads and headings as possible. Views that are not faced are
+// so once they are looked into, and left out where they then see fewer than gain_min_voxels; "gain"
+// takes none of them. Nothing if there is none to take, or none that can be reached for a rate.
+std::optional<ChosenView> choose(std::vector<NextView>& views, const ViewTimes& times,
+                                 bool per_minute, const FaceView& face = {},
+                                 std::uint32_t gain_min_voxels = 0);
 
 }  // namespace mission

@@ -1,7 +1,6 @@
 #include "planning/running_tally.hpp"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cstring>
 #include <numeric>
@@ -12,8 +11,14 @@
 namespace planning {
 namespace {
 
+// By z, then y, then x; for voxels of a box, which has at most 2^17 along each axis.
+std::uint64_t place(const Voxel& v) {
+  return static_cast<std::uint64_t>(v.z) << 40 | static_cast<std::uint64_t>(v.y) << 20 |
+         static_cast<std::uint64_t>(v.x);
+}
+
 bool by_place(const Voxel& a, const Voxel& b) {
-  return std::array{a.z, a.y, a.x} < std::array{b.z, b.y, b.x};
+  return place(a) < place(b);
 }
 
 bool same_box(const VoxelGrid& a, const VoxelGrid& b) {
@@ -172,10 +177,12 @@ void RunningTally::note_candidates(const std::vector<Voxel>& candidates) {
     std::sort(layer.fresh.begin(), layer.fresh.end(), by_place);
     layer.new_ones.emplace(layer.z, row_words, layer.fresh, 0);
     std::vector<Voxel> all;
-    for (int y = 0; y < map_->grid().ny; ++y)
-      for (int x = 0; x < map_->grid().nx; ++x)
-        if ((layer.known[word_of(layer, {x, y, layer.z}) - layer.word_begin] >> (x & 63) & 1) != 0)
-          all.push_back({x, y, layer.z});
+    for (std::size_t word = 0; word < layer.known.size(); ++word) {
+      const int y = static_cast<int>(word) / row_words,
+                x = 64 * (static_cast<int>(word) % row_words);
+      for (std::uint64_t bits = layer.known[word]; bits != 0; bits &= bits - 1)
+        all.push_back({x + std::countr_zero(bits), y, layer.z});
+    }
     layer.all.emplace(layer.z, row_words, all, 0);
   }
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <stdexcept>
 
@@ -77,20 +78,40 @@ double expected_density_ppm2(const VoxelGrid& grid, const BoundaryVoxel& u,
   return beams_per_sr(pattern) * facing_m / (range_m * range_m * across_m);
 }
 
+namespace {
+
+ViewLimits without_density(ViewLimits limits) {
+  limits.density_min_ppm2 = 0;
+  return limits;
+}
+
+}  // namespace
+
+ScanDensity::ScanDensity(const VoxelGrid& grid, const hal::ScanPattern& pattern,
+                         const Eigen::Isometry3d& T_W_S, const ViewLimits& limits)
+    : pattern_(pattern),
+      T_W_S_(T_W_S),
+      scanner_(grid.voxel_at(T_W_S.translation())),
+      rule_(without_density(limits), grid.voxel_m) {}
+
+float ScanDensity::on(const VoxelMap& map, const BoundaryVoxel& u) const {
+  return on(map, u, std::numeric_limits<float>::min());
+}
+
+float ScanDensity::on(const VoxelMap& map, const BoundaryVoxel& u, float least_ppm2) const {
+  if (!map.grid().contains(scanner_) || !rule_.admits(u, scanner_)) return 0;
+  const auto density_ppm2 =
+      static_cast<float>(expected_density_ppm2(map.grid(), u, pattern_, T_W_S_));
+  return density_ppm2 >= least_ppm2 && clear_between(map, u.v, scanner_) ? density_ppm2 : 0;
+}
+
 std::vector<float> scan_density(const VoxelMap& map, const std::vector<BoundaryVoxel>& surface,
                                 const hal::ScanPattern& pattern, const Eigen::Isometry3d& T_W_S,
                                 const ViewLimits& limits, int threads) {
   std::vector<float> density_ppm2(surface.size());
-  const Voxel scanner = map.grid().voxel_at(T_W_S.translation());
-  if (!map.grid().contains(scanner)) return density_ppm2;
-  ViewLimits geometry = limits;
-  geometry.density_min_ppm2 = 0;
-  const ViewRule rule(geometry, map.grid().voxel_m);
+  const ScanDensity scan(map.grid(), pattern, T_W_S, limits);
   for_pieces(threads, surface.size(), 256, [&](int, std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i)
-      if (rule.admits(surface[i], scanner) && clear_between(map, surface[i].v, scanner))
-        density_ppm2[i] =
-            static_cast<float>(expected_density_ppm2(map.grid(), surface[i], pattern, T_W_S));
+    for (std::size_t i = begin; i < end; ++i) density_ppm2[i] = scan.on(map, surface[i]);
   });
   return density_ppm2;
 }

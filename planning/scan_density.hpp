@@ -28,8 +28,28 @@ double beams_per_sr(const hal::ScanPattern& pattern);
 double expected_density_ppm2(const VoxelGrid& grid, const BoundaryVoxel& u,
                              const hal::ScanPattern& pattern, const Eigen::Isometry3d& T_W_S);
 
-// The same for each surface voxel, 0 for those that the scanner's voxel does not see: seeing is as
-// for Counts(p), without a limit of density. T_W_S must be inside the box; else all 0.
+// What one scan puts on surface voxels of a map that goes on changing.
+class ScanDensity {
+ public:
+  // limits: of range and angle; that of density is left aside. Throws std::invalid_argument as
+  // ViewRule does.
+  ScanDensity(const VoxelGrid& grid, const hal::ScanPattern& pattern,
+              const Eigen::Isometry3d& T_W_S, const ViewLimits& limits);
+
+  // Points per m^2 on u as the map has it; 0 where the scanner's voxel does not see it (seeing is
+  // as for Counts(p)) or lies outside the box. The map's box may have grown in z.
+  float on(const VoxelMap& map, const BoundaryVoxel& u) const;
+  // The same, or 0 if it is below least_ppm2 > 0: what falls short by its direction is not walked.
+  float on(const VoxelMap& map, const BoundaryVoxel& u, float least_ppm2) const;
+
+ private:
+  hal::ScanPattern pattern_;
+  Eigen::Isometry3d T_W_S_;
+  Voxel scanner_;
+  ViewRule rule_;
+};
+
+// The same for each surface voxel.
 std::vector<float> scan_density(const VoxelMap& map, const std::vector<BoundaryVoxel>& surface,
                                 const hal::ScanPattern& pattern, const Eigen::Isometry3d& T_W_S,
                                 const ViewLimits& limits, int threads = 1);

@@ -36,13 +36,16 @@ namespace planning {
 
 struct StopCertificate {
   std::optional<BestView> pessimistic;  // Unseen blocks, as in the paper.
-  std::optional<BestView> optimistic;   // Unseen is air.
+  // Unseen is air. If proven, the largest Opt(p) of all candidates, ties to the lowest index; else
+  // a witness: a candidate whose Opt(p) reaches the threshold, and Opt(p) there.
+  std::optional<BestView> optimistic;
   std::uint32_t threshold_voxels{};
 
   std::uint32_t pessimistic_max() const { return pessimistic ? pessimistic->gain_voxels : 0; }
-  std::uint32_t optimistic_max() const { return optimistic ? optimistic->gain_voxels : 0; }
+  // At least; the maximum if proven.
+  std::uint32_t optimistic_voxels() const { return optimistic ? optimistic->gain_voxels : 0; }
   // No view will ever see threshold_voxels.
-  bool proven() const { return optimistic_max() < threshold_voxels; }
+  bool proven() const { return optimistic_voxels() < threshold_voxels; }
   bool operator==(const StopCertificate&) const = default;
 };
 
@@ -62,7 +65,10 @@ struct OptimisticConfig {
 // boundary: the voxels that count in the paper's sense, boundary_unseen() or some of it.
 // candidates: every cell that is or may become one. Seen-occupied ones never will and are passed
 // over; the pessimistic count asks only those that are seen-empty. BestView::candidate is an index
-// into `candidates`. Costs two tallies, the second of all unseen voxels. Throws as tally() does.
+// into `candidates`.
+// Costs a tally, and where much is unseen little more: then one of a few cells that look promising
+// is a witness, asked alone. Only if none is, all unseen voxels are tallied for all cells, first
+// those around the most promising one, until some cell has enough. Throws as tally() does.
 StopCertificate stop_certificate(const VoxelMap& map, const std::vector<BoundaryVoxel>& boundary,
                                  const std::vector<Voxel>& candidates, const ViewLimits& limits,
                                  std::uint32_t threshold_voxels,

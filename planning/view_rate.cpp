@@ -19,13 +19,14 @@ constexpr auto kWorse = [](const auto& a, const auto& b) {
 
 }  // namespace
 
-ViewRates::ViewRates(std::vector<ViewOffer> offers, std::function<double(std::size_t)> takes_s)
-    : offers_(std::move(offers)), takes_s_(std::move(takes_s)) {
+ViewRates::ViewRates(std::vector<ViewOffer> offers, std::function<double(std::size_t)> takes_s,
+                     std::function<std::uint32_t(std::size_t)> gains)
+    : offers_(std::move(offers)), takes_s_(std::move(takes_s)), gains_(std::move(gains)) {
   for (std::size_t i = 0; i < offers_.size(); ++i) {
-    const ViewOffer& offer = offers_[i];
-    if (!(offer.least_s > 0) || !std::isfinite(offer.least_s))
+    const auto [gain_voxels, least_s] = offers_[i];
+    if (!(least_s > 0) || !std::isfinite(least_s))
       throw std::invalid_argument("view rates: least_s must be positive and finite");
-    heap_.push_back({per_minute(offer.gain_voxels, offer.least_s), i, offer.least_s, false});
+    heap_.push_back({per_minute(gain_voxels, least_s), i, gain_voxels, least_s, Known::bounds});
   }
   std::make_heap(heap_.begin(), heap_.end(), kWorse);
 }
@@ -35,14 +36,27 @@ std::optional<RatedView> ViewRates::next() {
     std::pop_heap(heap_.begin(), heap_.end(), kWorse);
     const Entry top = heap_.back();
     heap_.pop_back();
-    if (top.is_real) return RatedView{top.offer, top.takes_s, top.voxels_per_min};
-    ++asked_;
-    const ViewOffer& offer = offers_[top.offer];
-    const double takes_s = std::max(takes_s_(top.offer), offer.least_s);
-    if (std::isfinite(takes_s))
-      push({per_minute(offer.gain_voxels, takes_s), top.offer, takes_s, true});
+    if (top.known == Known::all)
+      return RatedView{top.offer, top.gain_voxels, top.takes_s, top.voxels_per_min};
+    look_into(top);
   }
   return std::nullopt;
+}
+
+// Its time first, which is cheaper; then what it gains.
+void ViewRates::look_into(Entry entry) {
+  if (entry.known == Known::bounds) {
+    ++asked_;
+    entry.takes_s = std::max(takes_s_(entry.offer), entry.takes_s);
+    if (!std::isfinite(entry.takes_s)) return;
+    entry.known = gains_ ? Known::time : Known::all;
+  } else {
+    entry.gain_voxels = std::min(gains_(entry.offer), entry.gain_voxels);
+    if (entry.gain_voxels == 0) return;
+    entry.known = Known::all;
+  }
+  entry.voxels_per_min = per_minute(entry.gain_voxels, entry.takes_s);
+  push(entry);
 }
 
 void ViewRates::push(const Entry& entry) {

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "planning/near_walls.hpp"
 #include "planning/voxel_parallel.hpp"
 
 namespace planning {
@@ -84,6 +85,7 @@ double drop_out_floor_m(const VoxelGrid& grid, double ground_z_m) {
 struct Reach {
   const InsertConfig& config;
   const BeamFan& fan;
+  const NearWalls& walls;
   std::optional<double> above_floor_m;  // Height of the scanner above drop_out_floor_m.
   InsertReport counted;
 
@@ -95,6 +97,10 @@ struct Reach {
   }
   float of_no_return(float trusted_m, std::uint32_t column, std::uint32_t row) {
     ++counted.no_returns;
+    if (walls.any() && trusted_m > 0 &&
+        walls.meets(fan.start(column, row),
+                    fan.end(column, row, static_cast<float>(config.range_min_m))))
+      return 0;
     if (above_floor_m) {
       const double climb = fan.climb(column, row);
       if (climb < 0) {
@@ -239,9 +245,10 @@ BeamReach beam_reach(const hal::ScanCloud& scan, const VoxelGrid& grid,
   if (config.ground_z_m)
     above_floor_m = T_W_S.translation().z() - drop_out_floor_m(grid, *config.ground_z_m);
 
+  const NearWalls walls(grid, T_W_S, fan.offset_max_m(), config);
   const std::uint32_t rows = scan.pattern.rows;
   std::vector<Reach> parts(static_cast<std::size_t>(std::max(config.threads, 1)),
-                           {config, fan, above_floor_m, {}});
+                           {config, fan, walls, above_floor_m, {}});
   const auto piece = [&](int thread, std::size_t begin, std::size_t end) {
     Reach reach = parts[static_cast<std::size_t>(thread)];
     std::size_t beam = begin * rows;

@@ -117,7 +117,7 @@ std::vector<float> trusted_no_returns(const hal::ScanCloud& scan, int window, do
                                       int threads = 1);
 
 // Every beam's reach: the range to its return if that is within limits, what is believed of
-// a beam without return (window and ground rule of `config`), 0 if it says nothing.
+// a beam without return (window, ground and wall rule of `config`), 0 if it says nothing.
 // Beam i has a return to be marked exactly if ranges_m[i] > 0 and reach_m[i] > 0.
 struct BeamReach {
   std::vector<float> reach_m;

@@ -55,6 +55,11 @@ struct VoxelCounts {
   auto operator<=>(const VoxelCounts&) const = default;
 };
 
+// A wall of the site's map as seen from above, of unknown height.
+struct WallLine {
+  Eigen::Vector2d W_from_m, W_to_m;
+};
+
 // How a scan is believed.
 struct InsertConfig {
   double range_min_m = 1.0;
@@ -67,6 +72,11 @@ struct InsertConfig {
   // the ground and did not pass through. It is carved only down to the top of the voxel layer that
   // holds this height, so that no ground voxel becomes seen-empty by a drop-out.
   std::optional<double> ground_z_m;
+  // Walls that are known to stand. One that is nearer than range_min_m gives nothing back, as the
+  // sky does: so a beam without return is not believed at all if its first range_min_m come, seen
+  // from above, within walls_margin_m of a wall. The margin is for the errors of pose and map.
+  std::vector<WallLine> walls;
+  double walls_margin_m = 0.15;
   int threads = 1;  // The result does not depend on it.
 };
 

@@ -93,9 +93,6 @@ PastSite past_site(const SiteOptions& options, const std::filesystem::path& map)
   if (!options.robot.empty()) site.config.robot = robot;
   for (const std::string& note : mission::differences(past, site.config))
     site.notes.push_back(note);
-  if (site.config.phase2.foliage)
-    site.notes.push_back(
-        "the map does not hold which voxels are foliage: views here look through none");
   mission::SiteModel model = mission::model_of(past, site.config, site.site.map, site.tasks.tasks,
                                                mission::threads_or_all(options.threads));
   return {past.map_file, std::move(site), std::move(model)};

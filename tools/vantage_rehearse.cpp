@@ -81,6 +81,10 @@ std::filesystem::path folder_of(const Options& options) {
 int rehearse(const Options& options) {
   const std::filesystem::path out = folder_of(options);
   mission::Prepared site = prepared(options.site, mission::WorldUse::world, options.model);
+  if (!options.model.empty())
+    site.notes.push_back(fmt::format(
+        "rehearsed in {} instead of the site's own model: coverage and truth are of that model",
+        options.model.generic_string()));
   if (!options.json) tell_remarks(site);
   const mission::RunOutcome outcome = mission::run_in_simulation(
       site, {.out = out,

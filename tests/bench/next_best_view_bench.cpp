@@ -297,7 +297,7 @@ void StopCertificate(benchmark::State& state) {
   planning::StopCertificate certificate;
   for (auto _ : state)
     certificate = planning::stop_certificate(q.map, q.boundary, q.candidates, kLimits, 100, config);
-  finish(state, q, certificate.optimistic_max());
+  finish(state, q, certificate.optimistic_voxels());
 }
 BENCHMARK(StopCertificate)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
 

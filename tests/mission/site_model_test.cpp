@@ -144,6 +144,31 @@ TEST(SiteModel, TakesAtMostAByteForEachVoxelUpToWhereItMayGrow) {
   }
 }
 
+// A wall of the map that is nearer than the scanner measures gives nothing back, as the sky does.
+TEST(SiteModelWalls, NearerThanTheScannerMeasuresHideWhatIsBehind) {
+  nav::SiteMap map = yard();
+  map.obstacles = {{box(20.3, 5, 21.5, 55), {}}};
+  MissionConfig config = config_of("voxel_m = 0.25\nheight_m = 10\n");
+  config.robot.scanner.range_min_m = 0.5;
+  SiteModel model(config, map, tasks(), 2);
+  worlds::World world;
+  world.boxes.push_back({{20.3, 5, 0}, {21.5, 55, 6}});
+  const Eigen::Isometry3d pose = worlds::upright({20, 30, 1.8}, 0.4);
+  hal::ScanCloud scan = scan_of(world, pose);
+  for (float& range_m : scan.ranges_m)
+    if (range_m < 0.5) range_m = 0;
+  add(model, scan, pose);
+  int behind = 0, before = 0;
+  const planning::VoxelGrid& grid = model.map().grid();
+  for (double y = 15; y < 45; y += 0.25) {
+    for (double x = 20.7; x < 40; x += 0.25)
+      behind += model.map().at(grid.voxel_at({x, y, 2})) == VoxelState::seen_empty;
+    before += model.map().at(grid.voxel_at({15, y, 2})) == VoxelState::seen_empty;
+  }
+  EXPECT_EQ(behind, 0);
+  EXPECT_EQ(before, 120);
+}
+
 // With a thin hedge at y = 20 to 22.
 hal::ScanCloud scan_over_hedge(const Eigen::Isometry3d& pose, double tower_m) {
   worlds::Random random(3);

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "tests/support/survey_site.hpp"
 
@@ -59,9 +61,36 @@ TEST(ViewTimes, AreInfiniteWhereNoRoadLeads) {
   EXPECT_TRUE(std::isinf(nowhere.takes_s(view_at(10, 10, 1))));
 }
 
+TEST(ShortestTrip, IsTheShortestOfAllOrdersAndLeavesWhatHasNoRoadForLast) {
+  const Yard yard;
+  const Eigen::Vector2d robot_m(20, 10);
+  const std::vector<ViewPlace> places{{0, {40, 10}}, {1, {5, 5}},   {0, {10, 50}},
+                                      {0, {30, 20}}, {0, {24, 50}}, {0, {50, 50}}};
+  const ViewTrip trip = shortest_trip(places, 0, &yard.roads, robot_m);
+  ASSERT_EQ(trip.by_road, 4U);
+  std::vector<std::size_t> order{0, 2, 4, 5};
+  double least_m = 1e9;
+  do {
+    double sum_m = 0;
+    Eigen::Vector2d at_m = robot_m;
+    for (const std::size_t i : order) {
+      sum_m += yard.roads.route(at_m, places[i].at_m)->length_m;
+      at_m = places[i].at_m;
+    }
+    least_m = std::min(least_m, sum_m);
+  } while (std::ranges::next_permutation(order).found);
+  EXPECT_NEAR(trip.road_m, least_m, 1e-6);
+  EXPECT_EQ(trip.order.size(), places.size());
+  EXPECT_EQ(trip.order[4], 1U) << "carried there";
+  EXPECT_EQ(trip.order[5], 3U) << "in the wall";
+  const ViewTrip no_roads = shortest_trip(places, 0, nullptr, robot_m);
+  EXPECT_EQ(no_roads.by_road, 0U);
+  EXPECT_EQ(no_roads.order, (std::vector<std::size_t>{0, 1, 2, 3, 4, 5}));
+}
+
 TEST(Choose, TakesTheMostVoxelsOrTheMostPerMinute) {
   const Yard yard;
-  const std::vector<NextView> views{view_at(40, 10, 300), view_at(10, 10, 200)};
+  std::vector<NextView> views{view_at(40, 10, 300), view_at(10, 10, 200)};
   const auto by_gain = choose(views, yard.times(), false);
   ASSERT_TRUE(by_gain);
   EXPECT_EQ(by_gain->view, 0U);
@@ -98,12 +127,65 @@ TEST(Choose, EqualsRatingEveryViewByItsRoad) {
 
 TEST(Choose, TakesTheBestByGainEvenIfNoRoadIsKnownAndNothingByRateIfNoneIs) {
   const Yard yard;
-  const std::vector<NextView> views{view_at(30, 20, 300)};
+  std::vector<NextView> views{view_at(30, 20, 300)}, none;
   const auto by_gain = choose(views, yard.times(), false);
   ASSERT_TRUE(by_gain);
   EXPECT_FALSE(by_gain->takes_min) << "the drive will tell why";
   EXPECT_FALSE(choose(views, yard.times(), true));
-  EXPECT_FALSE(choose({}, yard.times(), false));
+  EXPECT_FALSE(choose(none, yard.times(), false));
+}
+
+// A scanner that does not see all around: what a view sees is known once it is faced.
+TEST(Choose, EqualsFacingEveryViewAndFacesFew) {
+  const Yard yard;
+  support::Dice dice(4);
+  std::size_t faced = 0, all = 0;
+  for (int round = 0; round < 20; ++round) {
+    std::vector<NextView> views;
+    std::map<double, std::uint32_t> sees;  // By x.
+    for (int i = 0; i < 60; ++i) {
+      const auto around = static_cast<std::uint32_t>(100 + dice.below(200));
+      views.push_back(view_at(dice.uniform(0, 60), dice.uniform(0, 60), around));
+      views.back().faced = false;
+      sees[views.back().pose.position_m.x()] =
+          static_cast<std::uint32_t>(around * dice.uniform(0.4, 1));
+    }
+    std::ranges::stable_sort(views, std::ranges::greater{}, &NextView::voxels);
+    const ViewTimes times = yard.times({dice.uniform(2, 28), dice.uniform(2, 58)});
+    constexpr std::uint32_t kGainMin = 120;
+    std::size_t best = views.size();
+    double best_rate = 0;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const std::uint32_t voxels = sees.at(views[i].pose.position_m.x());
+      const double rate = 60.0 * voxels / times.takes_s(views[i]);
+      if (voxels < kGainMin || rate <= best_rate) continue;
+      best = i;
+      best_rate = rate;
+    }
+    const FaceView face = [&](NextView& view) {
+      ASSERT_FALSE(view.faced) << "once is enough";
+      view.faced = true;
+      view.voxels = sees.at(view.pose.position_m.x());
+    };
+    const auto chosen = choose(views, times, true, face, kGainMin);
+    ASSERT_TRUE(chosen);
+    EXPECT_EQ(chosen->view, best);
+    EXPECT_EQ(chosen->voxels_per_min, best_rate);
+    EXPECT_TRUE(views[best].faced);
+    faced += static_cast<std::size_t>(std::ranges::count_if(views, &NextView::faced));
+    all += views.size();
+    // Asked again without the best, it goes on from there.
+    views.erase(views.begin() + static_cast<std::ptrdiff_t>(best));
+    EXPECT_TRUE(choose(views, times, true, face, kGainMin));
+  }
+  EXPECT_LT(faced * 3, all);
+}
+
+TEST(Choose, TakesNoViewByGainThatIsNotFaced) {
+  const Yard yard;
+  std::vector<NextView> views{view_at(10, 10, 300)};
+  views.front().faced = false;
+  EXPECT_FALSE(choose(views, yard.times(), false));
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 
+#include "planning/best_heading.hpp"
 #include "tests/planning/view_cases.hpp"
 #include "tests/planning/voxel_oracle.hpp"
 
@@ -14,6 +15,7 @@ using planning::BoundaryVoxel;
 using planning::NextViewsConfig;
 using planning::PlannedView;
 using planning::ViewLimits;
+using planning::ViewTargets;
 using planning::Voxel;
 using planning::VoxelMap;
 using planning::VoxelState;
@@ -59,6 +61,74 @@ TEST(NextViews, EqualPlainGreedyWithAFullRecountOnRandomMaps) {
   EXPECT_GT(found, 500U);
 }
 
+// Who is seen by every candidate from its best heading, anew for every view.
+std::vector<PlannedView> plain_faced_greedy(const VoxelMap& map,
+                                            const std::vector<ViewTargets>& all,
+                                            const std::vector<Voxel>& candidates,
+                                            const NextViewsConfig& config) {
+  const planning::HorizontalView horizontal(config.fov_deg);
+  std::vector<ViewTargets> left = all;
+  const auto seen = [&](const std::vector<ViewTargets>& targets, Voxel p) {
+    std::vector<Voxel> voxels;
+    for (const ViewTargets& some : targets)
+      for (const BoundaryVoxel& u : some.voxels)
+        if (oracle::counts_geometrically(u, p, some.limits, map.grid().voxel_m) &&
+            oracle::visible(map, u.v, p))
+          voxels.push_back(u.v);
+    return voxels;
+  };
+  std::vector<PlannedView> views;
+  while (views.size() < config.views_max) {
+    PlannedView most;
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+      const auto [heading_rad, adds] = horizontal.best(candidates[i], seen(left, candidates[i]));
+      if (adds > most.adds_voxels) most = {i, 0, adds, heading_rad};
+    }
+    if (most.adds_voxels < std::max(config.adds_min_voxels, 1U)) break;
+    const Voxel p = candidates[most.candidate];
+    for (const Voxel v : seen(all, p)) most.sees_voxels += horizontal.faces(p, most.heading_rad, v);
+    views.push_back(most);
+    for (ViewTargets& some : left)
+      std::erase_if(some.voxels, [&](const BoundaryVoxel& u) {
+        return oracle::counts_geometrically(u, p, some.limits, map.grid().voxel_m) &&
+               oracle::visible(map, u.v, p) && horizontal.faces(p, most.heading_rad, u.v);
+      });
+  }
+  return views;
+}
+
+TEST(NextViews, FaceWhereTheyAddTheMostAsPlainGreedyWouldHaveIt) {
+  std::size_t found = 0;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    const worlds::ViewCase c = worlds::random_case(seed);
+    NextViewsConfig config{
+        .views_max = 1 + seed % 7,
+        .adds_min_voxels = static_cast<std::uint32_t>(seed % 3),
+        .fov_deg = seed % 4 == 0 ? 360.0 : 30.0 * static_cast<double>(seed % 11 + 1)};
+    // Some of the boundary has to be seen more steeply and from nearer.
+    std::vector<ViewTargets> targets{{{}, c.limits}, {{}, c.limits}};
+    targets[1].limits.grazing_max_deg *= 0.7;
+    targets[1].limits.range_max_m = std::max(0.7 * c.limits.range_max_m, c.limits.range_min_m);
+    for (std::size_t i = 0; i < c.boundary.size(); ++i)
+      targets[i % 3 == 0 ? 1 : 0].voxels.push_back(c.boundary[i]);
+    std::vector<std::uint32_t> counts(c.candidates.size());
+    for (const ViewTargets& some : targets) {
+      const auto part = planning::tally(c.map, some.voxels, c.candidates, some.limits);
+      for (std::size_t i = 0; i < counts.size(); ++i) counts[i] += part[i];
+    }
+    const auto slow = plain_faced_greedy(c.map, targets, c.candidates, config);
+    for (const int threads : {1, 3}) {
+      config.threads = threads;
+      const auto fast = planning::next_views(c.map, targets, c.candidates, counts, config);
+      ASSERT_EQ(fast.size(), slow.size()) << "seed " << seed;
+      for (std::size_t i = 0; i < slow.size(); ++i)
+        ASSERT_EQ(fast[i], slow[i]) << "seed " << seed << ", view " << i;
+    }
+    found += slow.size();
+  }
+  EXPECT_GT(found, 250U);
+}
+
 TEST(NextViews, EqualPlainGreedyOnASite) {
   const worlds::Site site;
   const auto boundary = planning::boundary_unseen(site.map);
@@ -102,7 +172,8 @@ TEST(NextViews, BeginWithTheNextBestViewAndStopBelowTheLeastGain) {
 
 TEST(NextViews, RefuseCountsThatAreNotOfTheCandidates) {
   const VoxelMap map = worlds::noise(3, 3, 3, 0.5, 0, 1);
-  EXPECT_THROW(planning::next_views(map, {}, {{0, 0, 0}}, {}, {}), std::invalid_argument);
+  EXPECT_THROW(planning::next_views(map, std::vector<ViewTargets>{}, {{0, 0, 0}}, {}),
+               std::invalid_argument);
 }
 
 TEST(VisitingOrder, IsTheCheapestOfAllPermutations) {

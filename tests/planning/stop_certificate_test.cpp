@@ -75,7 +75,10 @@ struct Question {
       std::erase_if(about.boundary, [&](const BoundaryVoxel& u) { return !config.counts(u.v); });
   }
 
-  StopCertificate certificate(std::uint32_t threshold = 100) const {
+  // Above every count, so that the largest is looked for.
+  static constexpr std::uint32_t kNever = 1U << 30;
+
+  StopCertificate certificate(std::uint32_t threshold = kNever) const {
     return planning::stop_certificate(about.map, about.boundary, about.candidates, about.limits,
                                       threshold, config);
   }
@@ -99,6 +102,58 @@ TEST(StopCertificate, EqualsTheDefinitionOnRandomMaps) {
     const StopCertificate found = q.certificate();
     ASSERT_EQ(found.pessimistic, pessimistic) << "seed " << seed;
     ASSERT_EQ(found.optimistic, optimistic) << "seed " << seed;
+  }
+}
+
+TEST(StopCertificate, NamesAWitnessExactlyWhereTheLargestCountReachesTheThreshold) {
+  int proven = 0, witnessed = 0;
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    const Question q(seed);
+    const std::uint32_t most = q.certificate().optimistic_voxels();
+    for (const std::uint32_t threshold : {1U, most / 2, most, most + 1}) {
+      const StopCertificate found = q.certificate(threshold);
+      ASSERT_EQ(found.proven(), most < threshold) << "seed " << seed;
+      if (found.proven()) {
+        ++proven;
+        ASSERT_EQ(found.optimistic_voxels(), most);
+      } else if (found.optimistic) {
+        ++witnessed;
+        const BestView& witness = *found.optimistic;
+        ASSERT_GE(witness.gain_voxels, threshold);
+        ASSERT_EQ(witness.gain_voxels,
+                  literal_optimum(q.about.map, q.about.candidates[witness.candidate],
+                                  q.about.limits, q.config));
+      }
+    }
+  }
+  EXPECT_GT(proven, 100);
+  EXPECT_GT(witnessed, 300);
+}
+
+// Where several cells are asked alone and the tally goes piece by piece.
+TEST(StopCertificate, OfASiteIsThatOfTheWholeTallyForAnyThresholdAndThreads) {
+  const worlds::Site site;
+  const std::vector<Voxel> cells = worlds::cells(site.map, site.world, 2);
+  const ViewLimits limits{1, 60, 70};
+  const VoxelMap optimistic = planning::optimistic_map(site.map, {});
+  const auto unseen = planning::exposable_unseen(site.map, optimistic);
+  const auto counts = planning::tally(optimistic, unseen, cells, limits, 2);
+  const BestView most = *planning::best(counts);
+  ASSERT_GT(unseen.size(), 20'000U);
+  for (const std::uint32_t threshold :
+       {100U, most.gain_voxels * 9 / 10, most.gain_voxels, most.gain_voxels + 1}) {
+    const auto ask = [&](int threads) {
+      OptimisticConfig config;
+      config.threads = threads;
+      return planning::stop_certificate(site.map, planning::boundary_unseen(site.map), cells,
+                                        limits, threshold, config);
+    };
+    const StopCertificate found = ask(1);
+    EXPECT_EQ(found, ask(3)) << threshold;
+    EXPECT_EQ(found.proven(), most.gain_voxels < threshold);
+    ASSERT_TRUE(found.optimistic);
+    EXPECT_TRUE(!found.proven() || found.optimistic == most);
+    EXPECT_EQ(found.optimistic_voxels(), counts[found.optimistic->candidate]) << threshold;
   }
 }
 
@@ -128,7 +183,7 @@ TEST(StopCertificate, BoundsEveryCountOfEveryFuture) {
   std::size_t more_than_now = 0, tight = 0;
   for (std::uint64_t seed = 1; seed <= 300; ++seed) {
     const Question q(seed);
-    const std::uint32_t bound = q.certificate().optimistic_max();
+    const std::uint32_t bound = q.certificate().optimistic_voxels();
     const std::uint32_t now = q.certificate().pessimistic_max();
     ASSERT_LE(now, bound);
     for (std::uint64_t k = 0; k < 12; ++k) {
@@ -159,11 +214,11 @@ TEST(StopCertificate, IsProvenBehindAWallAndNotBehindAnUnseenVoxel) {
     return planning::stop_certificate(map, planning::boundary_unseen(map), candidates, limits,
                                       threshold);
   };
-  EXPECT_EQ(ask(1).optimistic_max(), 0U);
+  EXPECT_EQ(ask(1).optimistic_voxels(), 0U);
   EXPECT_TRUE(ask(1).proven());
   map.set({4, 0, 0}, VoxelState::unseen);
   EXPECT_EQ(ask(2).pessimistic_max(), 1U);
-  EXPECT_EQ(ask(2).optimistic_max(), 5U);
+  EXPECT_EQ(ask(2).optimistic, (BestView{0, 5}));
   EXPECT_FALSE(ask(2).proven());
   EXPECT_TRUE(ask(6).proven());
 }

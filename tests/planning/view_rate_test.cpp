@@ -37,7 +37,8 @@ struct Offers {
     std::vector<RatedView> all;
     for (std::size_t i = 0; i < offers.size(); ++i) {
       const double time_s = std::max(takes_s[i], offers[i].least_s);
-      if (std::isfinite(time_s)) all.push_back({i, time_s, 60.0 * offers[i].gain_voxels / time_s});
+      if (std::isfinite(time_s))
+        all.push_back({i, offers[i].gain_voxels, time_s, 60.0 * offers[i].gain_voxels / time_s});
     }
     std::ranges::stable_sort(all, std::ranges::greater{}, &RatedView::voxels_per_min);
     return all;
@@ -80,8 +81,40 @@ TEST(ViewRates, PreferANearbyViewOfLessToAFarOneOfMore) {
                   [](std::size_t i) { return i == 0 ? 900.0 : 400.0; });
   const auto first = rates.next();
   ASSERT_TRUE(first);
-  EXPECT_EQ(*first, (RatedView{1, 400, 60}));
+  EXPECT_EQ(*first, (RatedView{1, 400, 400, 60}));
   EXPECT_EQ(rates.asked(), 1U) << "the far one cannot win: it need not be looked into";
+}
+
+// Gains are at most what the offers say; 0 where a view is of no use.
+TEST(ViewRates, GiveTheOrderOfASortOfAllRealRatesAndGains) {
+  std::size_t asked = 0, all = 0;
+  for (std::uint64_t seed = 1; seed <= 300; ++seed) {
+    const Offers most = random_offers(seed);
+    Offers real = most;
+    worlds::Random random(seed);
+    for (ViewOffer& offer : real.offers)
+      offer.gain_voxels =
+          worlds::uniform_int(random, 0, 9) == 0
+              ? 0
+              : static_cast<std::uint32_t>(offer.gain_voxels * worlds::uniform(random, 0.5, 1));
+    std::vector<int> calls(most.offers.size());
+    ViewRates rates(
+        most.offers, [&](std::size_t i) { return most.takes_s[i]; },
+        [&](std::size_t i) {
+          EXPECT_EQ(++calls[i], 1) << "asked twice";
+          return real.offers[i].gain_voxels;
+        });
+    std::vector<RatedView> expected = real.literally();
+    std::erase_if(expected, [](const RatedView& view) { return view.gain_voxels == 0; });
+    std::vector<RatedView> found;
+    while (const auto view = rates.next()) {
+      if (found.empty()) asked += static_cast<std::size_t>(std::ranges::count(calls, 1));
+      found.push_back(*view);
+    }
+    ASSERT_EQ(found, expected) << "seed " << seed;
+    all += most.offers.size();
+  }
+  EXPECT_LT(asked * 3, all) << "the bound should spare most questions";
 }
 
 TEST(ViewRates, TakeAWayShorterThanTheStraightOneForARoundingError) {

@@ -110,6 +110,38 @@ inline float trusted(const hal::ScanCloud& scan, std::int64_t column, std::int64
   return nearest;
 }
 
+// Whether two segments come within margin_m of each other, by walking along the first: from each
+// point on it as far as the nearest point of the second is away, less the margin.
+inline bool within(const planning::WallLine& wall, Eigen::Vector2d from, const Eigen::Vector2d& to,
+                   double margin_m) {
+  const Eigen::Vector2d along = wall.W_to_m - wall.W_from_m;
+  while (true) {
+    const double share = (from - wall.W_from_m).dot(along) / std::max(along.squaredNorm(), 1e-300);
+    const double off_m = (wall.W_from_m + std::clamp(share, 0.0, 1.0) * along - from).norm();
+    if (off_m <= margin_m) return true;
+    const double left_m = (to - from).norm(), step_m = off_m - margin_m + 1e-9;
+    if (step_m >= left_m) {
+      if (left_m == 0) return false;
+      from = to;
+    } else {
+      from += step_m / left_m * (to - from);
+    }
+  }
+}
+
+// A beam that would have met a mapped wall too near to be measured.
+inline bool met_too_near(const planning::VoxelGrid& grid, const planning::LatticePoint& start,
+                         const planning::LatticePoint& end, const planning::InsertConfig& config) {
+  const auto W_at_m = [&](const planning::LatticePoint& p) -> Eigen::Vector2d {
+    return grid.W_min_m.head<2>() +
+           grid.voxel_m / 2048 *
+               Eigen::Vector2d(static_cast<double>(p.x), static_cast<double>(p.y));
+  };
+  return std::any_of(config.walls.begin(), config.walls.end(), [&](const auto& wall) {
+    return within(wall, W_at_m(start), W_at_m(end), config.walls_margin_m);
+  });
+}
+
 // Calls visit(start, end, has_return) for every beam that says something, in order.
 template <class Visit>
 void for_beams(const planning::VoxelGrid& grid, const hal::ScanCloud& scan,
@@ -128,6 +160,8 @@ void for_beams(const planning::VoxelGrid& grid, const hal::ScanCloud& scan,
         continue;
       }
       if (!config.carve_no_return) continue;
+      const auto range_min_m = static_cast<float>(config.range_min_m);
+      if (met_too_near(grid, fan.start(c, r), fan.end(c, r, range_min_m), config)) continue;
       range_m = trusted(scan, c, r, config.no_return_window, config.range_max_m, wraps);
       if (config.ground_z_m && fan.climb(c, r) < 0) {
         const double ground = (*config.ground_z_m - grid.W_min_m.z()) / grid.voxel_m;

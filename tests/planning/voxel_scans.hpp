@@ -106,6 +106,20 @@ inline void bend(hal::ScanCloud& scan, Random& random) {
     }
 }
 
+// Walls around the scanner, some of them nearer than it measures, some no more than a point.
+inline void stand_walls(RandomScan& scan, Random& random) {
+  const Eigen::Vector2d W_scanner_m = scan.T_W_S.translation().head<2>();
+  const auto near = [&] {
+    return Eigen::Vector2d(W_scanner_m +
+                           Eigen::Vector2d(uniform(random, -4, 4), uniform(random, -4, 4)));
+  };
+  for (int i = uniform_int(random, 1, 5); i > 0; --i) {
+    const Eigen::Vector2d from = near();
+    scan.config.walls.push_back({from, uniform_int(random, 0, 5) == 0 ? from : near()});
+  }
+  scan.config.walls_margin_m = uniform_int(random, 0, 3) == 0 ? 1e-4 : uniform(random, 1e-4, 0.5);
+}
+
 inline RandomScan random_scan(Random& random) {
   RandomScan result;
   const int sides[] = {1, 2, 7, 20, 33, 63, 64, 65, 130};
@@ -135,6 +149,7 @@ inline RandomScan random_scan(Random& random) {
     result.scan.ranges_m.push_back(out);
   }
   if (uniform_int(random, 0, 2) == 0) bend(result.scan, random);
+  if (uniform_int(random, 0, 1) == 0) stand_walls(result, random);
   return result;
 }
 

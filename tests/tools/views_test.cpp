@@ -161,6 +161,57 @@ TEST_F(Views, NbvOfAnUnfinishedRunIsTheViewThatTheMissionTakesNext) {
   }
 }
 
+// A narrow scanner, a density goal and foliage: map and summary are enough for the mission's view.
+TEST_F(Views, NbvFacesAndCountsAsTheMissionDoesWithANarrowScannerADensityGoalAndFoliage) {
+  const std::string robot = (shared_->path() / "narrow.toml").string();
+  std::ofstream(robot) << "[scanner]\nfov_deg = 130\nazimuth_step_deg = 0.4\nelevation_step_deg = "
+                          "0.1667\n[pan]\nangle_max_deg = 360\n";
+  for (const int views : {0, 1}) {
+    const std::string name = "narrow" + std::to_string(views);
+    std::ofstream(mission(name)) << "robot = 'narrow.toml'\nsite = '" << site("courtyard")
+                                 << "'\n[phase1]\ngain_min = 0.05\n[phase2]\nheight_m = 52.0\n"
+                                    "density_min_ppm2 = 60\nfoliage = true\nviews_max = "
+                                 << views << "\n";
+    ASSERT_EQ(test::run_program("vantaged", mission(name) + " --quiet --out " + run_of(name),
+                                folder_.path())
+                  .code,
+              0);
+  }
+  const auto next = decisions("narrow1", "next_best_view").front();
+  const auto chosen = decisions("narrow1", "view").front();
+  const std::string map = " --map " + run_of("narrow0");
+  for (const std::string& which :
+       {"--mission " + mission("narrow0"), "--site " + site("courtyard")}) {
+    const Outcome outcome = run("nbv --json --k 3 " + which + map);
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    const auto answer = outcome.json();
+    EXPECT_EQ(answer.at("best_voxels"), next.at("best_voxels"));
+    const auto& first = answer.at("next_views").at(0);
+    EXPECT_EQ(first.at("x_m"), chosen.at("at_m").at(0));
+    EXPECT_EQ(first.at("y_m"), chosen.at("at_m").at(1));
+    EXPECT_EQ(first.at("sees_voxels"), next.at("best_voxels"));
+    EXPECT_EQ(answer.at("next_views").as_array().size(), 3U);
+    EXPECT_EQ(answer.at("visiting_by_road").to_number<int>(), 3);
+    EXPECT_EQ(answer.at("visiting_order").as_array().size(), 3U);
+    EXPECT_GT(answer.at("visiting_road_m").to_number<double>(), 1);
+    for (std::size_t i = 0; i < 3; ++i)
+      EXPECT_NEAR(answer.at("next_views").at(i).at("heading_deg").to_number<double>(),
+                  next.at("ahead").at(i).at("heading_rad").to_number<double>() * 180 / M_PI, 1e-9);
+    EXPECT_EQ(answer.at("fov_deg").to_number<double>(), 130);
+    EXPECT_GT(answer.at("density").at("reached_voxels").to_number<int>(), 1000);
+    EXPECT_GT(answer.at("density").at("surface_voxels").to_number<int>(),
+              answer.at("density").at("reached_voxels").to_number<int>());
+    EXPECT_EQ(answer.at("notes").as_array().size(), 0U) << answer.at("notes");
+  }
+  // Another robot's scanner sees more from there, and a note says why the answer is another.
+  const Outcome wide = run("nbv --json --site " + site("courtyard") + map + " --robot " +
+                           (shared_->path() / "r.toml").string());
+  ASSERT_EQ(wide.code, 0) << wide.err;
+  EXPECT_GT(wide.json().at("best_voxels").to_number<int>(),
+            next.at("best_voxels").to_number<int>());
+  EXPECT_THAT(wide.out, HasSubstr("fov_deg was 130 in the run and is 360 here"));
+}
+
 // Without a mission file, the run itself says where its robot could stand.
 TEST_F(Views, RadiusAndMarginAreTheRunsUnlessFilesSayOtherwise) {
   std::ofstream(shared_->path() / "broad.toml")
@@ -398,6 +449,76 @@ TEST_F(Views, RehearsalGoesIntoRunsByDefault) {
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_EQ(outcome.json().at("plan_file").as_string(), "runs/yard-rehearsal/plan.toml");
   EXPECT_TRUE(fs::exists(folder_.path() / "runs/yard-rehearsal/summary.json"));
+}
+
+// The courtyard as one knows it beforehand: blocks of about the right height, one stairwell in
+// another place and the others left out; no balconies, no bridge, no planters, and no ground.
+std::string rough_courtyard() {
+  const struct {
+    double x0_m, y0_m, x1_m, y1_m, top_m;
+  } kBlocks[] = {{-50.4, -33.6, 50.4, -17.4, 20}, {-50.4, 16.6, 50.4, 34.4, 40},
+                 {44.4, -17.4, 50.4, 16.6, 12},   {-50.4, -17.4, -49.6, 16.6, 4},
+                 {-33, -17.4, -28, -11, 20},      {2, 12, 9, 16.6, 40}};
+  constexpr int kFaces[][4] = {
+      {0, 1, 5, 4}, {1, 3, 7, 5}, {3, 2, 6, 7}, {2, 0, 4, 6}, {4, 5, 7, 6}};
+  std::string obj;
+  int first = 1;
+  for (const auto& b : kBlocks) {
+    for (const double z_m : {0.0, b.top_m})
+      for (const double y_m : {b.y0_m, b.y1_m})
+        for (const double x_m : {b.x0_m, b.x1_m}) obj += fmt::format("v {} {} {}\n", x_m, y_m, z_m);
+    for (const auto& f : kFaces)
+      obj += fmt::format("f {} {} {} {}\n", first + f[0], first + f[1], first + f[2], first + f[3]);
+    first += 8;
+  }
+  return obj;
+}
+
+TEST_F(Views, RehearsalInARoughModelGivesAPlanThatTheRealMissionTours) {
+  write_mission("yard", 3);
+  const auto model = write("rough.obj", rough_courtyard()).string();
+  const auto plan = (shared_->path() / "rough_plan.toml").string();
+  const Outcome rehearsed = run("rehearse --json " + mission("yard") + " --model " + model +
+                                " --out " + run_of("rough") + " --save " + plan);
+  ASSERT_EQ(rehearsed.code, 0) << rehearsed.err;
+  const auto rehearsal = rehearsed.json();
+  EXPECT_TRUE(rehearsal.at("completed").as_bool());
+  EXPECT_EQ(rehearsal.at("plan_file").as_string(), plan);
+  EXPECT_THAT(json::serialize(rehearsal.at("notes")), HasSubstr("a level ground was added"));
+  EXPECT_THAT(read_text(rehearsal.at("report").as_string().c_str()), HasSubstr("rough.obj"));
+  const auto& stations = rehearsal.at("plan").as_array();
+  EXPECT_EQ(stations.size(), rehearsal.at("stations").to_number<std::size_t>() +
+                                 rehearsal.at("next_best_views").to_number<std::size_t>());
+
+  write_mission("yard_planned", 0, "plan = '" + plan + "'\n");
+  ASSERT_EQ(test::run_program("vantaged",
+                              mission("yard_planned") + " --quiet --out " + run_of("yard_planned"),
+                              folder_.path())
+                .code,
+            0);
+  const json::value real =
+      json::parse(read_text(fs::path(run_of("yard_planned")) / "summary.json"));
+  EXPECT_TRUE(real.at("completed").as_bool());
+  std::size_t told = real.at("dropped").as_array().size();
+  for (const auto& scan : real.at("scans").as_array())
+    told += std::ranges::any_of(stations, [&](const json::value& station) {
+      return station.at("name") == scan.at("name");
+    });
+  EXPECT_EQ(told, stations.size()) << "each is scanned from, or dropped for a reason";
+  EXPECT_GT(real.at("truth").at("seen_of_visible").to_number<double>(), 0.9);
+}
+
+TEST_F(Views, RehearsalRefusesAModelThatIsNone) {
+  write_mission("yard", 0);
+  const auto empty = write("empty.obj", "# nothing\n").string();
+  for (const std::string& model : {std::string("none.obj"), empty}) {
+    const auto out = folder_.path() / "o";
+    const Outcome outcome =
+        run("rehearse --json " + mission("yard") + " --model " + model + " --out " + out.string());
+    EXPECT_EQ(outcome.code, 2) << model;
+    EXPECT_THAT(outcome.err, HasSubstr(model));
+    EXPECT_FALSE(fs::exists(out)) << model;
+  }
 }
 
 TEST_F(Views, RehearsalRefusesASiteWithoutAModel) {
