@@ -65,8 +65,16 @@ void normalize(std::vector<SeenWord>& words) {
 
 }  // namespace
 
+RunningTally::Options RunningTally::default_options() {
+  Options options;
+#ifndef NDEBUG
+  options.self_check = true;
+#endif
+  return options;
+}
+
 RunningTally::RunningTally(const ViewLimits& limits, int threads)
-    : RunningTally(limits, threads, Options{}) {}
+    : RunningTally(limits, threads, default_options()) {}
 
 RunningTally::RunningTally(const ViewLimits& limits, int threads, const Options& options)
     : limits_(limits), threads_(std::max(threads, 1)), options_(options) {}

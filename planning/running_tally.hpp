@@ -39,7 +39,8 @@ class RunningTally {
     bool whole{};                // memory_max_bytes was exceeded: tally() did it.
   };
 
-  // Throws std::invalid_argument as tally() does, at update().
+  // Throws std::invalid_argument as tally() does, at update(). Without options, debug builds check
+  // themselves.
   explicit RunningTally(const ViewLimits& limits, int threads = 1);
   RunningTally(const ViewLimits& limits, int threads, const Options& options);
 
@@ -58,6 +59,8 @@ class RunningTally {
   const Work& work() const { return work_; }
 
  private:
+  static Options default_options();
+
   // Words and hidden_by as in SeenSet, each once; words ascending.
   struct Sight {
     BoundaryVoxel u;
