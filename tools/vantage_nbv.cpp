@@ -170,6 +170,10 @@ void print_views(const Views& views) {
 
 void print_trip(const mission::ViewTrip& trip) {
   if (trip.order.size() < 2) return;
+  if (trip.by_road == 0) {
+    fmt::print("  no road leads from the start to any of them\n");
+    return;
+  }
   std::string order;
   for (const std::size_t view : trip.order) order += fmt::format(" {}", view + 1);
   fmt::print("  visit them in the order{}: {:.0f} m of road from the start", order, trip.road_m);
