@@ -1,41 +1,37 @@
-// Where the robot is: an extended Kalman filter over wheel travel, gyro and satellite fixes whose
-// covariance can be believed, also after minutes at a standstill. Pure: values in, values out.
+// Where the robot is: an error-state Kalman filter over wheel travel, inertial samples, satellite
+// fixes and whatever else tells of the pose, with a covariance that can be believed, also after
+// minutes at a standstill. Measurements may come late and in any order. Pure: values in, values
+// out.
 #pragma once
 
 #include <Eigen/Core>
+#include <deque>
 #include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "hal/values.hpp"
+#include "nav/localizer_filter.hpp"
 
 namespace nav {
 
-// One-sigma values of the devices.
-struct LocalizerConfig {
-  double track_m = 0.6;      // Between left and right wheels.
-  double slip_sigma = 0.02;  // Of the travel of each side; wanders over slip_length_m.
-  double slip_length_m = 5.0;
-  double side_slip_sigma = 0.005;         // Sideways, metres per square root of a metre driven.
-  double gyro_sigma_radps = 0.00087;      // White noise of one sample (0.05 deg/s).
-  double gyro_bias_sigma_radps = 0.0017;  // What the bias may be at the start (0.1 deg/s).
-  double gyro_bias_walk = 1.0e-6;         // Drift of the bias, rad/s per square root of a second.
-  // Of the variance that a fix claims, this share is an error that wanders over gnss_wander_s
-  // seconds (atmosphere, multipath); the rest is white. Averaging removes only the white part.
-  double gnss_wander_share = 0.5;
-  double gnss_wander_s = 60.0;
-  // A fix is refused when its squared normalised innovation exceeds this (chi-square, 2 degrees of
-  // freedom, 99.9 %).
-  double gate_chi2 = 13.8;
-  // When fixes that agree with each other were refused for this long and this far, the filter is
-  // taken to be the one that is lost. Both must hold: no jump moves a robot that stands.
-  double lost_after_s = 20.0;
-  double lost_after_m = 10.0;
+std::string_view name(Source source);
+
+// A source whose measurements are refused one after the other.
+struct LocalizerFault {
+  Source source{};
+  int count{};
+  double since_s{};  // Robot's clock.
+  std::string text;  // What, and what to do.
 };
 
-// What became of a fix.
-enum class Gate {
-  accepted,
-  rejected,  // Outlier, older than the last, not finite, sigma below 0: the pose did not change.
-  reset      // Accepted after widening the covariance: the filter had been lost.
+// What a localizer did with a measurement.
+struct Correction {
+  Gate gate = Gate::rejected;
+  bool too_late{};  // Older than the history.
+  double nis{};     // Squared normalised innovation; 0 where it was not computed.
+  int dimension{};
 };
 
 class Localizer {
@@ -44,62 +40,47 @@ class Localizer {
   Localizer(const LocalizerConfig& config, const hal::Pose2& start,
             const Eigen::Matrix3d& covariance);
 
+  // Each event takes effect where its stamp belongs, whenever it comes, up to config.history_s
+  // late: what came after it is then done again. Same events, same result, in whatever order.
+  Correction add(const LocalizerEvent& event);
+
   // Gyro samples count from the one before; they take effect with the next travel report.
   void predict(const hal::ImuSample& sample);
   // Heading comes from the gyro for the time that its samples cover, from the wheels otherwise.
   // Reports of no travel tell the gyro's bias and add no uncertainty.
-  void predict(const hal::WheelTravel& travel);
+  void predict(const hal::WheelTravel& travel) { add(travel); }
   Gate correct(const hal::GnssFix& fix);
 
-  hal::Pose2 pose() const;             // Heading in (-pi, pi].
-  Eigen::Matrix3d covariance() const;  // Of (x, y, heading), in W.
-  double gyro_bias_radps() const { return state_[kBias]; }
-  bool standing() const { return still_s_ >= kStandingAfter_s; }
+  hal::Pose2 pose() const { return filter_.pose(); }                   // Heading in (-pi, pi].
+  Eigen::Matrix3d covariance() const { return filter_.covariance(); }  // Of (x, y, heading), in W.
+  Eigen::Isometry3d T_W_B() const { return filter_.T_W_B(); }          // With slope.
+  // At a stamp within the history; before it the oldest pose known, after it the last speed goes
+  // on for at most half a second.
+  hal::Pose2 pose_at(hal::Time stamp) const;
+  double gyro_bias_radps() const { return filter_.gyro_bias_radps().z(); }
+  bool standing() const { return filter_.standing(); }
+
+  std::vector<LocalizerFault> faults() const;
 
  private:
-  // x, y, heading, gyro bias, slip of each side (share of its travel), and the wandering error of
-  // the fixes in units of its own sigma.
-  enum { kX, kY, kHeading, kBias, kSlipLeft, kSlipRight, kWanderX, kWanderY, kSize };
-  using State = Eigen::Matrix<double, kSize, 1>;
-  using RowState = Eigen::Matrix<double, 1, kSize>;
-  using Matrix = Eigen::Matrix<double, kSize, kSize>;
-
-  static constexpr double kStandingAfter_s = 0.5;
-
-  // Gyro samples since the last travel report.
-  struct Turn {
-    double angle_rad{};
-    double span_s{};
-    double variance{};  // Of angle_rad, from white noise.
-  };
-  // Refused fixes in a row that agree with each other.
-  struct Streak {
-    hal::Time first{};
-    Eigen::Vector2d position_m{0, 0};
-    double odometer_m{};  // Where the last one came.
-    double first_odometer_m{};
+  struct Entry {
+    hal::Time stamp;
+    LocalizerEvent event;
+    LocalizerFilter after;
   };
 
-  bool stands(const hal::WheelTravel& travel, const Turn& turn, double span_s);
-  void learn_bias(const Turn& turn);
-  void move(const hal::WheelTravel& travel, const Turn& turn, double by_wheels);
-  void forget_slip(int side, double travel_m);
-  void wander(hal::Time now);
-  bool lost(const hal::GnssFix& fix);
-  void update(const Eigen::Matrix<double, 2, kSize>& H, const Eigen::Vector2d& innovation,
-              const Eigen::Matrix2d& S, double white_variance);
+  void forget(hal::Time now);
 
   LocalizerConfig config_;
-  State state_ = State::Zero();
-  Matrix covariance_ = Matrix::Zero();
-  Turn turn_;
-  std::optional<hal::Time> imu_time_;
-  std::optional<hal::Time> travel_time_;
-  std::optional<hal::Time> fix_time_;
-  std::optional<Streak> streak_;
-  double speed_mps_{};   // Of the last travel report.
-  double odometer_m_{};  // All travel, forward or backward.
-  double still_s_{};
+  LocalizerFilter oldest_;  // Before the first entry.
+  std::optional<hal::Time> final_until_;
+  std::deque<Entry> history_;
+  LocalizerFilter filter_;  // After the last entry.
 };
+
+// Where something on the body is: T_W_B from the localizer, its mount on the pan axis and the pan
+// angle. T_B_P: the pan axis (z) on the body at angle 0; T_P_S: the scanner on the turntable.
+Eigen::Isometry3d mounted_pose(const Eigen::Isometry3d& T_W_B, const Eigen::Isometry3d& T_B_P,
+                               double pan_rad, const Eigen::Isometry3d& T_P_S);
 
 }  // namespace nav
