@@ -202,7 +202,7 @@ std::string RobotDrivers::complaints() const {
   std::string text = told([](const auto& device) {
     return device.state() != drivers::DeviceState::running || !device.troubles().empty();
   });
-  const std::string& scan = scan_problem_();
+  const std::string& scan = scan_problem();
   if (!scan.empty()) text += (text.empty() ? "" : "; ") + ("the last scan: " + scan);
   return text;
 }

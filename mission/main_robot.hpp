@@ -61,6 +61,8 @@ class RobotDrivers {
   hal::Task<void> release() { return release_drive_(); }
   // All that is wrong now, with the remedies; empty: nothing.
   std::string complaints() const;
+  // Why the last scan was not good enough; empty: it was, or there was none.
+  const std::string& scan_problem() const { return scan_problem_(); }
 
  private:
   void add_drive(const RobotConfig& config, const Links& links);
