@@ -86,19 +86,21 @@ std::vector<Setting> pdo_settings(std::uint8_t node, const PdoSetup& setup) {
                         kAll,
                         "PDO at least every ms",
                         setup.event_timer_ms == 0});
-  settings.push_back({{map, 0}, 1, 0, kAll, "mapping emptied"});
-  for (std::size_t i = 0; i < setup.mapping.size(); ++i)
-    settings.push_back({{map, static_cast<std::uint8_t>(i + 1)},
-                        4,
-                        mapping_word(setup.mapping[i]),
-                        kAll,
-                        "mapped object"});
-  settings.push_back({{map, 0},
-                      1,
-                      static_cast<std::uint32_t>(setup.mapping.size()),
-                      kAll,
-                      "number of mapped objects"});
   settings.push_back({{parameters, 1}, 4, cob_id, kCobIdMask, "PDO on"});
+  if (setup.fixed) return settings;
+  std::vector<Setting> maps{{{map, 0}, 1, 0, kAll, "mapping emptied"}};
+  for (std::size_t i = 0; i < setup.mapping.size(); ++i)
+    maps.push_back({{map, static_cast<std::uint8_t>(i + 1)},
+                    4,
+                    mapping_word(setup.mapping[i]),
+                    kAll,
+                    "mapped object"});
+  maps.push_back({{map, 0},
+                  1,
+                  static_cast<std::uint32_t>(setup.mapping.size()),
+                  kAll,
+                  "number of mapped objects"});
+  settings.insert(settings.end() - 1, maps.begin(), maps.end());
   return settings;
 }
 

@@ -64,6 +64,7 @@ struct PdoSetup {
   std::uint8_t transmission{};     // 0 acyclic, 1..240 every n-th SYNC, 254 and 255 on change.
   std::uint16_t event_timer_ms{};  // TPDO only; 0: none.
   std::vector<Mapped> mapping;
+  bool fixed{};  // The node's own mapping: it is not written.
 };
 
 // The writes that map one PDO of a node, in the order that drives insist on (pre-operational only).

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "drivers/cia402_layout.hpp"
+
 namespace drivers::cia402 {
 namespace {
 
@@ -105,14 +107,27 @@ std::int32_t Scale::units(double speed_mps, std::int32_t limit) const {
   return static_cast<std::int32_t>(std::clamp<double>(wanted, -static_cast<double>(limit), limit));
 }
 
+std::vector<canopen::PdoSetup> velocity_pdos(const VelocityConfig& config,
+                                             const PdoLayout& layout) {
+  const auto setup = [&](const PdoLayout::Part& part, bool from_node) {
+    return canopen::PdoSetup{part.number, from_node,    config.sync_every,
+                             0,           part.mapping, layout.fixed};
+  };
+  std::vector<canopen::PdoSetup> pdos{setup(layout.target, false), setup(layout.status, true)};
+  if (layout.position.number != layout.status.number) pdos.push_back(setup(layout.position, true));
+  return pdos;
+}
+
 std::vector<canopen::PdoSetup> velocity_pdos(const VelocityConfig& config) {
-  const VelocityObjects objects = velocity_objects(config.mode);
-  return {{1, false, config.sync_every, 0, {{kControlword, 16, false}, objects.target}},
-          {1, true, config.sync_every, 0, {{kStatusword, 16, false}, objects.actual}},
-          {2, true, config.sync_every, 0, {{kPosition, 32, true}, {kTorqueActual, 16, true}}}};
+  return velocity_pdos(config, own_layout(config.mode));
 }
 
 std::vector<canopen::Setting> velocity_settings(const VelocityConfig& config) {
+  return velocity_settings(config, own_layout(config.mode));
+}
+
+std::vector<canopen::Setting> velocity_settings(const VelocityConfig& config,
+                                                const PdoLayout& layout) {
   constexpr std::uint32_t kAll = 0xFFFFFFFF;
   const std::uint32_t watch = std::uint32_t{config.master} << 16 | config.master_heartbeat_max_ms;
   std::vector<canopen::Setting> settings{
@@ -125,7 +140,7 @@ std::vector<canopen::Setting> velocity_settings(const VelocityConfig& config) {
   ramp(kAcceleration, config.acceleration, "acceleration");
   ramp(kDeceleration, config.deceleration, "deceleration");
   ramp(kQuickStopDeceleration, config.quick_stop_deceleration, "quick-stop deceleration");
-  for (const canopen::PdoSetup& pdo : velocity_pdos(config)) {
+  for (const canopen::PdoSetup& pdo : velocity_pdos(config, layout)) {
     const auto writes = canopen::pdo_settings(config.node, pdo);
     settings.insert(settings.end(), writes.begin(), writes.end());
   }

@@ -99,10 +99,16 @@ struct VelocityConfig {
   std::uint8_t sync_every = 1;    // PDOs with every n-th SYNC.
 };
 
+struct PdoLayout;  // cia402_layout.hpp
+
 // RPDO1: controlword and target. TPDO1: statusword and speed. TPDO2: position and torque.
 std::vector<canopen::PdoSetup> velocity_pdos(const VelocityConfig& config);
+// The same where a drive has its own mapping.
+std::vector<canopen::PdoSetup> velocity_pdos(const VelocityConfig& config, const PdoLayout& layout);
 
 // All that a drive must hold before it may drive, in order, to be written in pre-operational.
 std::vector<canopen::Setting> velocity_settings(const VelocityConfig& config);
+std::vector<canopen::Setting> velocity_settings(const VelocityConfig& config,
+                                                const PdoLayout& layout);
 
 }  // namespace drivers::cia402

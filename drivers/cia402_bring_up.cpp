@@ -48,6 +48,17 @@ hal::Task<std::optional<Trouble>> Cia402Drive::bring_up(Node& node) {
   const int boots = node.boots;
   co_await send(canopen::Nmt{canopen::NmtCommand::pre_operational, node.side.node});
   if (auto failure = co_await identify(node)) co_return failure;
+  const cia402::VelocityConfig wanted = velocity_config(node);
+  node.layout = cia402::own_layout(config_.mode);
+  auto failure = co_await apply_all(node, cia402::velocity_settings(wanted));
+  if (failure && node.refused_mapping) failure = co_await use_fixed_mapping(node, wanted);
+  if (failure) co_return failure;
+  if (node.boots != boots)
+    co_return Trouble{&faults()[kNotOperational], who(node, "it restarted meanwhile")};
+  co_return co_await start(node);
+}
+
+cia402::VelocityConfig Cia402Drive::velocity_config(const Node& node) const {
   cia402::VelocityConfig wanted;
   wanted.node = node.side.node;
   wanted.master = config_.master;
@@ -57,14 +68,45 @@ hal::Task<std::optional<Trouble>> Cia402Drive::bring_up(Node& node) {
   wanted.acceleration = config_.acceleration;
   wanted.deceleration = config_.deceleration;
   wanted.quick_stop_deceleration = config_.quick_stop_deceleration;
-  const auto settings = cia402::velocity_settings(wanted);
+  return wanted;
+}
+
+// Where the drive will not be mapped: by what it has.
+hal::Task<std::optional<Trouble>> Cia402Drive::use_fixed_mapping(
+    Node& node, const cia402::VelocityConfig& wanted) {
+  cia402::FixedPdos has;
+  for (std::uint16_t i = 0; i < 4; ++i) {
+    has.to_node[i] = co_await read_mapping(node, static_cast<std::uint16_t>(0x1600 + i));
+    has.from_node[i] = co_await read_mapping(node, static_cast<std::uint16_t>(0x1A00 + i));
+  }
+  const std::string lacks = cia402::find_layout(has, config_.mode, node.layout);
+  if (!lacks.empty()) co_return Trouble{&faults()[kFixedMapping], who(node, lacks)};
+  co_return co_await apply_all(node, cia402::velocity_settings(wanted, node.layout));
+}
+
+// As cia402::FixedPdos has it.
+hal::Task<std::vector<canopen::Mapped>> Cia402Drive::read_mapping(Node& node, std::uint16_t index) {
+  std::vector<canopen::Mapped> mapping;
+  const std::uint32_t entries = co_await number(node, {index, 0});
+  for (std::uint32_t i = 1; entries <= 8 && i <= entries; ++i) {
+    const std::uint32_t word = co_await number(node, {index, static_cast<std::uint8_t>(i)});
+    mapping.push_back(canopen::mapped(word));
+  }
+  co_return mapping;
+}
+
+hal::Task<std::optional<Trouble>> Cia402Drive::apply_all(Node& node,
+                                                         std::vector<canopen::Setting> settings) {
+  node.refused_mapping = false;
   for (const canopen::Setting& setting : settings)
     if (auto failure = against_eds(node, setting)) co_return failure;
-  for (const canopen::Setting& setting : settings)
-    if (auto failure = co_await apply(node, setting)) co_return failure;
-  if (node.boots != boots)
-    co_return Trouble{&faults()[kNotOperational], who(node, "it restarted meanwhile")};
-  co_return co_await start(node);
+  for (const canopen::Setting& setting : settings) {
+    auto failure = co_await apply(node, setting);
+    if (!failure) continue;
+    node.refused_mapping = cia402::is_mapping(setting.at) && failure->fault != &faults()[kSilent];
+    co_return failure;
+  }
+  co_return std::nullopt;
 }
 
 hal::Task<std::optional<Trouble>> Cia402Drive::identify(Node& node) {
@@ -107,8 +149,9 @@ std::optional<Trouble> Cia402Drive::against_eds(const Node& node,
   };
   if (entry == nullptr) return trouble("not there");
   if (eds::bits_of(entry->data_type) != 8U * setting.size) return trouble("of another size");
-  if (entry->access == eds::Access::read_only || entry->access == eds::Access::constant)
-    return trouble("read-only");
+  const bool locked =
+      entry->access == eds::Access::read_only || entry->access == eds::Access::constant;
+  if (locked && !cia402::is_mapping(setting.at)) return trouble("read-only");
   return std::nullopt;
 }
 

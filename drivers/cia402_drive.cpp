@@ -117,37 +117,38 @@ void Cia402Drive::on(const canopen::Sdo& sdo, hal::Time) {
 void Cia402Drive::on(const canopen::Pdo& pdo, hal::Time at) {
   Node* const node = node_of(pdo.node);
   if (node == nullptr || !node->configured || pdo.asked) return;
-  if (pdo.number == 1) on_status(*node, pdo, at);
-  if (pdo.number == 2) on_position(*node, pdo, at);
+  if (pdo.number == node->layout.status.number) on_status(*node, pdo, at);
+  if (pdo.number == node->layout.position.number) on_position(*node, pdo, at);
 }
 
 void Cia402Drive::on_status(Node& node, const canopen::Pdo& pdo, hal::Time at) {
-  const canopen::Mapped mapping[]{{cia402::kStatusword, 16, false}, objects_.actual};
-  std::int64_t values[2]{};
-  if (!canopen::unpack(mapping, pdo, values)) {
+  const auto& mapping = node.layout.status.mapping;
+  const auto statusword = cia402::value_in(mapping, pdo, cia402::kStatusword);
+  const auto velocity = cia402::value_in(mapping, pdo, objects_.actual.at);
+  if (!statusword || !velocity) {
     node.heard.unread_at = at;
     node.heard.unread_why = "PDO too short";
     return;
   }
-  node.heard.statusword = static_cast<std::uint16_t>(values[0]);
-  node.heard.velocity = values[1];
+  node.heard.statusword = static_cast<std::uint16_t>(*statusword);
+  node.heard.velocity = *velocity;
   node.heard.status_at = at;
   if (++node.heard.since_sync > 1) node.heard.doubled_at = at;
 }
 
 void Cia402Drive::on_position(Node& node, const canopen::Pdo& pdo, hal::Time at) {
-  const canopen::Mapped mapping[]{{cia402::kPosition, 32, true}, {cia402::kTorqueActual, 16, true}};
-  std::int64_t values[2]{};
-  if (!canopen::unpack(mapping, pdo, values)) return;
+  const auto& mapping = node.layout.position.mapping;
+  const auto position = cia402::value_in(mapping, pdo, cia402::kPosition);
+  if (!position) return;
   Reports& heard = node.heard;
-  const auto raw = static_cast<std::uint32_t>(values[0]);
+  const auto raw = static_cast<std::uint32_t>(*position);
   const std::uint32_t forward = node.side.counts_per_m < 0 ? 0U - raw : raw;
   if (heard.position_before_restart) {  // How far it rolled without power nobody knows.
     heard.position_offset = static_cast<std::uint32_t>(*heard.position_before_restart) - forward;
     heard.position_before_restart.reset();
   }
   heard.position = static_cast<std::int32_t>(forward + heard.position_offset);
-  heard.torque_permille = values[1];
+  heard.torque_permille = cia402::value_in(mapping, pdo, cia402::kTorqueActual).value_or(0);
   heard.position_at = at;
   (&node == &left_ ? left_fresh_ : right_fresh_) = true;
   if (left_fresh_ && right_fresh_) roll(at);
@@ -281,15 +282,23 @@ double Cia402Drive::target_mps(const Node& node) const {
 }
 
 canopen::Pdo Cia402Drive::target(Node& node, hal::Time now) {
-  const canopen::Mapped mapping[]{{cia402::kControlword, 16, false}, objects_.target};
   const auto most = static_cast<std::int32_t>(
       std::min(2e9, std::abs(config_.speed_max_mps * node.side.units_per_mps)));
   const cia402::Scale scale{node.side.units_per_mps};
-  const std::int64_t values[]{controlword(node, now), scale.units(target_mps(node), most)};
+  const std::int64_t word = controlword(node, now);
+  const std::int64_t speed = scale.units(target_mps(node), most);
+  const auto& mapping = node.layout.target.mapping;
+  std::array<std::int64_t, 8> values{};  // What is neither of these is padding.
+  const std::size_t count = std::min(mapping.size(), values.size());
+  for (std::size_t i = 0; i < count; ++i)
+    values[i] = mapping[i].at == cia402::kControlword ? word
+                : mapping[i].at == objects_.target.at ? speed
+                : mapping[i].at == cia402::kModes     ? static_cast<int>(config_.mode)
+                                                      : 0;
   canopen::Pdo pdo;
   pdo.node = node.side.node;
-  pdo.number = 1;
-  canopen::pack(mapping, values, pdo);
+  pdo.number = node.layout.target.number;
+  canopen::pack(mapping, std::span(values).first(count), pdo);
   return pdo;
 }
 
@@ -303,7 +312,12 @@ hal::Task<hal::Result<void>> Cia402Drive::command(hal::Twist twist) {
     co_return make_error_code(errc::invalid_argument);
   wanted_ = {};
   if (way_.refuses(twist)) co_return make_error_code(errc::io_error);
-  if (!moving_allowed_ || released_) co_return make_error_code(errc::not_connected);
+  if (released_) co_return make_error_code(errc::not_connected);
+  if (!moving_allowed_) {
+    const hal::Time now = clock_.now();
+    const bool held = reports(left_, now) && reports(right_, now);
+    co_return make_error_code(held ? errc::operation_not_permitted : errc::not_connected);
+  }
   wanted_ = twist;
   wanted_at_ = clock_.now();
   co_return hal::Result<void>{};

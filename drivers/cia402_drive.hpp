@@ -11,6 +11,7 @@
 
 #include "drivers/canopen_pdo.hpp"
 #include "drivers/cia402.hpp"
+#include "drivers/cia402_layout.hpp"
 #include "drivers/device.hpp"
 #include "drivers/eds.hpp"
 #include "drivers/odometer.hpp"
@@ -22,9 +23,10 @@
 
 namespace drivers {
 
-// Configures both drives (every setting read back), enables both, and moves them only while both
-// are enabled and report: when one drops out, the other is stopped in the same cycle of 20 ms. The
-// drives themselves stop when this program's heartbeat is missing for 300 ms. A drive that was
+// Configures both drives (every setting read back; PDO mappings where they can be written, else the
+// drive's own mapping is used if it has what is needed), enables both, and moves them only while
+// both are enabled and report: when one drops out, the other is stopped in the same cycle of 20 ms.
+// The drives themselves stop when this program's heartbeat is missing for 300 ms. A drive that was
 // switched off is configured anew; a fault is reset a few times, then left for a person.
 class Cia402Drive final : public hal::Drive, public Device {
  public:
@@ -54,7 +56,9 @@ class Cia402Drive final : public hal::Drive, public Device {
   // Slowed down as a whole beyond speed_max_mps. Fails with
   //   errc::io_error: the wheels stood though they were told to turn (Config::stall); both are told
   //     to stand, and stay so until something else than pushing on is commanded;
-  //   errc::not_connected: not both drives are enabled (troubles() says why);
+  //   errc::operation_not_permitted: both report, but not both are enabled: their STO input is open
+  //     or a fault holds them (troubles() says which);
+  //   errc::not_connected: not both report;
   //   errc::invalid_argument: not finite.
   hal::Task<hal::Result<void>> command(hal::Twist twist) override;
   // Waits for both drives, however long one is silent. One caller at a time.
@@ -98,6 +102,8 @@ class Cia402Drive final : public hal::Drive, public Device {
     std::deque<hal::CanFrame> replies;  // At most kRepliesMax; the oldest are lost beyond that.
     hal::Wake replied;
     bool configured = false;
+    cia402::PdoLayout layout;
+    bool refused_mapping = false;    // In the dialogue under way.
     std::optional<Trouble> failure;  // Why it is not configured.
     std::string serial, type, version;
     hal::Duration answer_took{};
@@ -130,7 +136,12 @@ class Cia402Drive final : public hal::Drive, public Device {
 
   hal::Task<std::optional<Trouble>> bring_up(Node& node);
   hal::Task<std::optional<Trouble>> identify(Node& node);
+  hal::Task<std::optional<Trouble>> apply_all(Node& node, std::vector<canopen::Setting> settings);
   hal::Task<std::optional<Trouble>> apply(Node& node, const canopen::Setting& setting);
+  hal::Task<std::optional<Trouble>> use_fixed_mapping(Node& node,
+                                                      const cia402::VelocityConfig& wanted);
+  hal::Task<std::vector<canopen::Mapped>> read_mapping(Node& node, std::uint16_t index);
+  cia402::VelocityConfig velocity_config(const Node& node) const;
   hal::Task<std::optional<Trouble>> start(Node& node);
   hal::Task<void> look_after(Node& node);
   hal::Task<Outcome> transfer(Node& node, canopen::SdoClient client);

@@ -56,7 +56,8 @@ enum Which {
   kJumped,
   kDisagree,
   kWarning,
-  kBlocked
+  kBlocked,
+  kFixedMapping
 };
 
 }  // namespace drivers::cia402_times

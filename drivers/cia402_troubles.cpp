@@ -57,6 +57,9 @@ constexpr Fault kFaults[] = {
     {22, "drive warns", "bit 7 of its statusword: near a limit", "see its error register"},
     {23, "way blocked", "the wheels stand though they are told to turn",
      "free the robot; see whether something blocks its wheels"},
+    {24, "drive's fixed PDO mapping does not do",
+     "its mapping cannot be written, and has not what is needed",
+     "take a drive or firmware whose PDOs can be mapped, or whose own hold these objects"},
 };
 
 std::string milliseconds(hal::Duration span) {

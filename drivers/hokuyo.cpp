@@ -1,7 +1,5 @@
 #include "drivers/hokuyo.hpp"
 
-#include <array>
-#include <boost/asio/experimental/awaitable_operators.hpp>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -12,11 +10,8 @@ namespace drivers {
 namespace {
 
 using namespace std::chrono_literals;
-using namespace boost::asio::experimental::awaitable_operators;
-using boost::system::errc::make_error_code;
+using namespace profile_fault;
 
-constexpr Fault kUnplugged{1, "no connection", "the cable, the network or the scanner's power",
-                           "check power, cable and address; it comes back by itself"};
 constexpr Fault kSilent{2, "no answer",
                         "no power, still starting (10 s), a cable, a wrong address or speed, or "
                         "another program that holds its only connection",
@@ -24,31 +19,19 @@ constexpr Fault kSilent{2, "no answer",
                         "at 19200 or 115200 baud"};
 constexpr Fault kGarbage{3, "not SCIP", "another device, or a serial line at the wrong speed",
                          "check what is connected there; try 19200, 38400 and 115200 baud"};
-constexpr Fault kOtherModel{4, "wrong model", "another scanner than the robot file says",
-                            "connect the right one, or name this one in the robot file"};
 constexpr Fault kRefused{5, "request refused", "the scanner does not accept it",
                          "see the detail; compare with the model's"};
 constexpr Fault kSector{6, "impossible sector", "the robot file asks for steps that it has not",
                         "correct the scanner's sector in the robot file"};
-constexpr Fault kQuiet{7, "scans stopped", "the connection or the scanner hangs",
-                       "it is restarted by itself; if it stays, switch its power off and on"};
 constexpr Fault kDamaged{8, "damaged scans", "bytes change or go missing on the way",
                          "check the cable and its shield"};
 
 constexpr hal::Duration kStartTimeout = 15s;
-constexpr hal::Duration kProfileTimeout = 2s;
-constexpr hal::Duration kAliveEvery = 10s;
 constexpr hal::Duration kAnswer = 1s;
 constexpr hal::Duration kHalfMillisecond = 500us;  // Its clock leaves out what has not passed.
 constexpr int kClockQuestions = 5;
 constexpr int kCleanAgain = 100;
 constexpr float kNoClaim = std::numeric_limits<float>::quiet_NaN();
-
-std::uint64_t bytes_skipped(const Resync& resync) {
-  std::uint64_t bytes = 0;
-  for (const auto& [why, skipped] : resync.skipped()) bytes += skipped.bytes;
-  return bytes;
-}
 
 std::string found(const ScipInfo& info, std::string_view key) {
   for (const auto& [known, value] : info)
@@ -59,55 +42,31 @@ std::string found(const ScipInfo& info, std::string_view key) {
 }  // namespace
 
 Hokuyo::Hokuyo(HokuyoConfig config, hal::Clock& clock, hal::ByteStream& stream)
-    : config_(std::move(config)), clock_(clock), stream_(stream) {}
+    : ProfileLoop({.frame_max = kScipFrameMax,
+                   .look = look_scip,
+                   .start_max = kStartTimeout,
+                   .profiles_max = config.profiles_max,
+                   .retry_s = config.retry_s,
+                   .silent = &kSilent,
+                   .garbage = &kGarbage},
+                  clock, stream),
+      config_(std::move(config)) {}
 
 Hokuyo::~Hokuyo() = default;
 
-hal::Task<void> Hokuyo::run() {
-  for (;;) {
-    state_ = DeviceState::starting;
-    co_await session();
-    state_ = DeviceState::lost;
-    streaming_ = false;
-    switched_.notify();
-    co_await clock_.sleep_for(hal::from_seconds(config_.retry_s));
-  }
-}
-
-// Ends when the scanner is lost; the trouble says why.
-hal::Task<void> Hokuyo::session() {
+void Hokuyo::begin_session() {
   asked_.clear();
-  streaming_ = false;
-  bytes_ = damaged_ = 0;
-  resync_ = Resync(kScipFrameMax);
-  co_await (receive() || converse());
+  damaged_ = 0;
 }
 
-hal::Task<void> Hokuyo::receive() {
-  std::array<std::uint8_t, 16384> buffer;
-  for (;;) {
-    const auto got = co_await stream_.read_some(buffer);
-    if (!got) {
-      troubles_.set(kUnplugged, got.error().message());
-      co_return;
-    }
-    troubles_.clear(kUnplugged);
-    const hal::Time arrival = clock_.now();
-    bytes_ += *got;
-    resync_.feed(ByteView(buffer).first(*got));
-    while (const auto frame = resync_.next(look_scip)) take(*frame, arrival);
-  }
-}
-
-hal::Task<void> Hokuyo::converse() {
+hal::Task<bool> Hokuyo::set_up() {
   const bool awake = co_await wake_up();
-  if (!awake) co_return;
-  const bool known = co_await identify();
-  if (!known) co_return;
-  for (const Fault* fault : {&kSilent, &kGarbage, &kOtherModel, &kRefused, &kSector, &kQuiet})
-    troubles_.clear(*fault);
-  state_ = DeviceState::running;
-  co_await serve();
+  if (!awake) co_return false;
+  co_return co_await identify();
+}
+
+void Hokuyo::clear_set_up_troubles() {
+  for (const Fault* fault : {&kRefused, &kSector}) troubles_.clear(*fault);
 }
 
 // Whatever it was doing, it stops and speaks SCIP 2.
@@ -121,12 +80,7 @@ hal::Task<bool> Hokuyo::wake_up() {
       (void)co_await ask("SCIP2.0", kAnswer);
     }
   }
-  if (troubles_.has(kUnplugged)) co_return false;
-  const bool garbage = bytes_skipped(resync_) > 0;
-  troubles_.clear(garbage ? kSilent : kGarbage);
-  troubles_.set(garbage ? kGarbage : kSilent,
-                garbage ? std::to_string(bytes_) + " bytes came, none of them an answer"
-                        : "to QT and SCIP2.0");
+  tell_silence("to QT and SCIP2.0");
   co_return false;
 }
 
@@ -231,13 +185,7 @@ hal::Task<std::optional<Hokuyo::Answer>> Hokuyo::ask(std::string command, hal::D
   asked_ = command;
   answer_.reset();
   const Bytes request = scip_request(command);
-  const auto written = co_await (stream_.write(request) || clock_.sleep_until(deadline));
-  if (const auto* result = std::get_if<0>(&written)) {
-    if (*result)
-      troubles_.clear(kUnplugged);
-    else
-      troubles_.set(kUnplugged, result->error().message());
-  }
+  co_await write(request, deadline);
   while (!answer_) {
     const bool woken = co_await answered_.wait_until(clock_, deadline);
     if (!woken) break;
@@ -248,57 +196,13 @@ hal::Task<std::optional<Hokuyo::Answer>> Hokuyo::ask(std::string command, hal::D
   co_return answer;
 }
 
-// Until the scanner is lost.
-hal::Task<void> Hokuyo::serve() {
-  for (;;) {
-    if (wanted_ != streaming_) {
-      bool done = false;
-      if (wanted_)
-        done = co_await begin();
-      else
-        done = co_await end();
-      if (!done) co_return;
-    } else if (!streaming_) {
-      const bool changed = co_await changed_.wait_until(clock_, clock_.now() + kAliveEvery);
-      if (changed) continue;
-      const bool there = co_await insist("QT", kAnswer);
-      if (!there) co_return;
-    } else {
-      const hal::Duration quiet = hal::from_seconds(3 * period_s()) + 100ms;
-      co_await changed_.wait_until(clock_, clock_.now() + quiet);
-      const hal::Duration silence = clock_.now() - last_scan_;
-      if (!wanted_ || silence <= quiet) continue;
-      troubles_.set(kQuiet, "none for " + std::to_string(silence / 1ms) + " ms");
-      if (silence > 2s) co_return;
-    }
-  }
+hal::Task<bool> Hokuyo::stream(bool on) {
+  if (on) co_return co_await begin();
+  co_return co_await end();
 }
 
-hal::Task<hal::Result<void>> Hokuyo::start() {
-  wanted_ = true;
-  changed_.notify();
-  const hal::Time deadline = clock_.now() + kStartTimeout;
-  while (!streaming_ || state_ != DeviceState::running) {
-    const bool changed = co_await switched_.wait_until(clock_, deadline);
-    if (!changed) co_return make_error_code(boost::system::errc::timed_out);
-  }
-  co_return hal::Result<void>{};
-}
-
-hal::Task<hal::Result<void>> Hokuyo::stop() {
-  wanted_ = false;
-  changed_.notify();
-  const hal::Time deadline = clock_.now() + kStartTimeout;
-  while (streaming_) {
-    const bool changed = co_await switched_.wait_until(clock_, deadline);
-    if (!changed) co_return make_error_code(boost::system::errc::timed_out);
-  }
-  co_return hal::Result<void>{};
-}
-
-hal::Task<hal::Result<hal::Profile>> Hokuyo::next_profile() {
-  if (!wanted_) co_return make_error_code(boost::system::errc::operation_not_permitted);
-  co_return co_await queue_.next(clock_, kProfileTimeout);
+hal::Task<bool> Hokuyo::is_alive() {
+  co_return co_await insist("QT", kAnswer);
 }
 
 void Hokuyo::take(ByteView frame, hal::Time arrival) {
@@ -313,7 +217,7 @@ void Hokuyo::take(ByteView frame, hal::Time arrival) {
 }
 
 void Hokuyo::take_scan(hal::Time arrival) {
-  const std::uint64_t skipped = bytes_skipped(resync_);
+  const std::uint64_t skipped = bytes_skipped();
   const auto why = decode_scip_scan(reply_, scan_);
   clean_ = why.empty() && skipped == damaged_ ? clean_ + 1 : 0;
   damaged_ = skipped;

@@ -41,6 +41,9 @@ class SerialPort final : public hal::ByteStream, public Link {
 
 // Applies the line's settings to an open port and reads them back.
 boost::system::error_code apply_settings(int port, const SerialLine& line);
+// The speed that a port is set to, in baud; of a pseudo terminal also from its master's end. 0: it
+// is no port.
+std::uint32_t speed_of(int port);
 // So that nobody else opens it or talks in between; ends when it is closed.
 boost::system::error_code lock_port(int port);
 

@@ -78,6 +78,11 @@ error_code apply_settings(int port, const SerialLine& line) {
   return {};
 }
 
+std::uint32_t speed_of(int port) {
+  termios2 is{};
+  return ioctl(port, TCGETS2, &is) == 0 ? is.c_ospeed : 0;
+}
+
 error_code lock_port(int port) {
   if (flock(port, LOCK_EX | LOCK_NB) != 0) return last_error();
   if (ioctl(port, TIOCEXCL) != 0) return last_error();

@@ -1,7 +1,5 @@
 #include "drivers/sick_lms.hpp"
 
-#include <array>
-#include <boost/asio/experimental/awaitable_operators.hpp>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -10,52 +8,41 @@ namespace drivers {
 namespace {
 
 using namespace std::chrono_literals;
-using namespace boost::asio::experimental::awaitable_operators;
-using boost::system::errc::make_error_code;
+using namespace profile_fault;
 
 constexpr Fault kImpossible{0, "impossible settings",
                             "the robot file asks for what no such model has",
                             "correct the scanner's settings in the robot file"};
-constexpr Fault kUnplugged{1, "no connection", "the cable, the network or the scanner's power",
-                           "check power, cable and address; it comes back by itself"};
 constexpr Fault kSilent{
     2, "no answer", "no power, still starting (up to 90 s), a cable, or a wrong address or speed",
     "check power and cable; CoLa answers on TCP port 2111 or 2112, or on a "
     "serial line at 57600 baud"};
 constexpr Fault kGarbage{3, "not CoLa", "another device, or a serial line at the wrong speed",
                          "check what is connected there; set the serial line to 57600 baud"};
-constexpr Fault kOtherModel{4, "wrong model", "another scanner than the robot file says",
-                            "connect the right one, or name this one in the robot file"};
 constexpr Fault kRefused{5, "setting refused", "the scanner does not accept a setting",
                          "see the detail; compare the settings with the model's"};
 constexpr Fault kReadBack{6, "settings differ", "the scanner is not set as it was told to be",
                           "let no other program set it; if it stays, restart the scanner"};
-constexpr Fault kQuiet{7, "scans stopped", "the connection or the scanner hangs",
-                       "it is restarted by itself; if it stays, switch its power off and on"};
 constexpr Fault kDamaged{8, "damaged telegrams", "bytes change or go missing on the way",
                          "check the cable and its shield"};
 
 constexpr hal::Duration kStartTimeout = 10s;
-constexpr hal::Duration kProfileTimeout = 2s;
-constexpr hal::Duration kAliveEvery = 10s;
 constexpr hal::Duration kForgetClock = 60s;  // Without scans the wraps cannot be told any more.
 constexpr int kCleanAgain = 100;
 constexpr std::uint32_t kJustStarted = 0x0100;
 
-std::uint64_t bytes_skipped(const Resync& resync) {
-  std::uint64_t bytes = 0;
-  for (const auto& [why, skipped] : resync.skipped()) bytes += skipped.bytes;
-  return bytes;
-}
-
-std::string ms(double span_s) {
-  return std::to_string(std::lround(span_s * 1000)) + " ms";
-}
-
 }  // namespace
 
 SickLms::SickLms(SickLmsConfig config, hal::Clock& clock, hal::ByteStream& stream)
-    : config_(config), clock_(clock), stream_(stream) {}
+    : ProfileLoop({.frame_max = kColaFrameMax,
+                   .look = look_cola,
+                   .start_max = kStartTimeout,
+                   .profiles_max = config.profiles_max,
+                   .retry_s = config.retry_s,
+                   .silent = &kSilent,
+                   .garbage = &kGarbage},
+                  clock, stream),
+      config_(config) {}
 
 SickLms::~SickLms() = default;
 
@@ -78,52 +65,29 @@ double SickLms::period_s() const {
 hal::Task<void> SickLms::run() {
   if (const auto problem = lms_settings_problem(config_.settings); !problem.empty()) {
     troubles_.set(kImpossible, problem);
-    for (;;) co_await clock_.sleep_for(kAliveEvery);
+    for (;;) co_await clock_.sleep_for(kForgetClock);
   }
-  for (;;) {
-    ++counts_.sessions;
-    state_ = DeviceState::starting;
-    co_await session();
-    state_ = DeviceState::lost;
-    interrupted_ = interrupted_ || streaming_;
-    streaming_ = false;
-    switched_.notify();
-    co_await clock_.sleep_for(hal::from_seconds(config_.retry_s));
-  }
+  co_await ProfileLoop::run();
 }
 
-// Ends when the scanner is lost; the trouble says why.
-hal::Task<void> SickLms::session() {
+void SickLms::begin_session() {
+  ++counts_.sessions;
   asked_ = nullptr;
   forget_clock();  // It may have been without power, for however long.
-  streaming_ = set_up_lost_ = false;
-  bytes_ = damaged_ = 0;
-  resync_ = Resync(kColaFrameMax);
-  co_await (receive() || converse());
+  set_up_lost_ = false;
+  damaged_ = 0;
 }
 
-hal::Task<void> SickLms::receive() {
-  std::array<std::uint8_t, 16384> buffer;
-  for (;;) {
-    const auto got = co_await stream_.read_some(buffer);
-    if (!got) {
-      troubles_.set(kUnplugged, got.error().message());
-      co_return;
-    }
-    troubles_.clear(kUnplugged);
-    const hal::Time arrival = clock_.now();
-    bytes_ += *got;
-    resync_.feed(ByteView(buffer).first(*got));
-    while (const auto frame = resync_.next(look_cola)) take(*frame, arrival);
-  }
+hal::Task<bool> SickLms::set_up() {
+  const bool talks = co_await find_dialect();
+  if (!talks) co_return false;
+  const bool known = co_await identify();
+  if (!known) co_return false;
+  co_return co_await apply_settings();
 }
 
-hal::Task<void> SickLms::converse() {
-  if (!co_await find_dialect() || !co_await identify() || !co_await set_up()) co_return;
-  for (const Fault* fault : {&kSilent, &kGarbage, &kOtherModel, &kRefused, &kReadBack, &kQuiet})
-    troubles_.clear(*fault);
-  state_ = DeviceState::running;
-  co_await serve();
+void SickLms::clear_set_up_troubles() {
+  for (const Fault* fault : {&kRefused, &kReadBack}) troubles_.clear(*fault);
 }
 
 // The last dialect first.
@@ -135,12 +99,7 @@ hal::Task<bool> SickLms::find_dialect() {
     }
     dialect_ = dialect_ == ColaDialect::binary ? ColaDialect::ascii : ColaDialect::binary;
   }
-  if (troubles_.has(kUnplugged)) co_return false;
-  const bool garbage = bytes_skipped(resync_) > 0;
-  troubles_.clear(garbage ? kSilent : kGarbage);
-  troubles_.set(garbage ? kGarbage : kSilent,
-                garbage ? std::to_string(bytes_) + " bytes came, none of them an answer"
-                        : "to the question for its state, in CoLa B and in CoLa A");
+  tell_silence("to the question for its state, in CoLa B and in CoLa A");
   co_return false;
 }
 
@@ -156,7 +115,7 @@ hal::Task<bool> SickLms::identify() {
   co_return false;
 }
 
-hal::Task<bool> SickLms::set_up() {
+hal::Task<bool> SickLms::apply_settings() {
   for (const LmsStep& step : lms_startup(dialect_, config_.settings)) {
     if (step.command == "sEA") continue;  // Scans come between start() and stop() only.
     if (!step.may_fail) {
@@ -197,41 +156,23 @@ hal::Task<std::optional<SickLms::Answer>> SickLms::ask(const LmsStep& step) {
   const hal::Time deadline = clock_.now() + hal::from_seconds(step.timeout_s);
   asked_ = &step;
   answer_.reset();
-  const auto written = co_await (stream_.write(step.request) || clock_.sleep_until(deadline));
-  if (const auto* result = std::get_if<0>(&written)) {
-    if (*result)
-      troubles_.clear(kUnplugged);
-    else
-      troubles_.set(kUnplugged, result->error().message());
-  }
+  co_await write(step.request, deadline);
   while (!answer_ && co_await answered_.wait_until(clock_, deadline)) {
   }
   asked_ = nullptr;
   co_return std::exchange(answer_, std::nullopt);
 }
 
-// Until the scanner is lost.
-hal::Task<void> SickLms::serve() {
-  for (;;) {
-    if (wanted_ != streaming_) {
-      if (!co_await subscribe(wanted_)) co_return;
-    } else if (!streaming_) {
-      const bool changed = co_await changed_.wait_until(clock_, clock_.now() + kAliveEvery);
-      if (!changed && !co_await insist(lms_hello(dialect_))) co_return;
-    } else {
-      const hal::Duration quiet = hal::from_seconds(3 * period_s()) + 100ms;
-      co_await changed_.wait_until(clock_, clock_.now() + quiet);
-      if (set_up_lost_) co_return;
-      const hal::Duration silence = clock_.now() - last_scan_;
-      if (wanted_ && silence > quiet) {
-        troubles_.set(kQuiet, "none for " + ms(hal::seconds(silence)));
-        if (silence > 2s || !co_await subscribe(true)) co_return;
-      }
-    }
-  }
+hal::Task<bool> SickLms::is_alive() {
+  const LmsStep hello = lms_hello(dialect_);
+  co_return co_await insist(hello);
 }
 
-hal::Task<bool> SickLms::subscribe(bool on) {
+hal::Task<bool> SickLms::revive() {
+  co_return co_await stream(true);
+}
+
+hal::Task<bool> SickLms::stream(bool on) {
   const bool again = on && streaming_;
   if (!again && (interrupted_ || clock_.now() - last_scan_ > kForgetClock)) forget_clock();
   if (!again && !interrupted_) {  // What was not asked for is not lost.
@@ -254,29 +195,9 @@ void SickLms::forget_clock() {
   last_start_us_.reset();
 }
 
-hal::Task<hal::Result<void>> SickLms::start() {
-  wanted_ = true;
-  changed_.notify();
-  const hal::Time deadline = clock_.now() + kStartTimeout;
-  while (!streaming_)
-    if (!co_await switched_.wait_until(clock_, deadline))
-      co_return make_error_code(boost::system::errc::timed_out);
-  co_return hal::Result<void>{};
-}
-
 hal::Task<hal::Result<void>> SickLms::stop() {
-  wanted_ = interrupted_ = false;
-  changed_.notify();
-  const hal::Time deadline = clock_.now() + kStartTimeout;
-  while (streaming_)
-    if (!co_await switched_.wait_until(clock_, deadline))
-      co_return make_error_code(boost::system::errc::timed_out);
-  co_return hal::Result<void>{};
-}
-
-hal::Task<hal::Result<hal::Profile>> SickLms::next_profile() {
-  if (!wanted_) co_return make_error_code(boost::system::errc::operation_not_permitted);
-  co_return co_await queue_.next(clock_, kProfileTimeout);
+  interrupted_ = false;
+  co_return co_await ProfileLoop::stop();
 }
 
 void SickLms::take(ByteView frame, hal::Time arrival) {
@@ -345,7 +266,7 @@ bool SickLms::is_new(hal::Time arrival) {
 }
 
 void SickLms::judge_damage() {
-  const std::uint64_t damaged = bytes_skipped(resync_);
+  const std::uint64_t damaged = bytes_skipped();
   clean_ = damaged == damaged_ ? clean_ + 1 : 0;
   damaged_ = damaged;
   if (clean_ == 0) troubles_.set(kDamaged, std::to_string(damaged) + " bytes of no telegram");

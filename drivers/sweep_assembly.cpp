@@ -13,6 +13,7 @@ constexpr double kDeg = kPi / 180;
 constexpr float kNoClaim = std::numeric_limits<float>::quiet_NaN();
 constexpr double kUprightMax_rad = 10 * kDeg;  // Of the mirror's axis from the horizon.
 constexpr double kReach_rad = 0.5 * kDeg;      // By so much a field may be missed.
+constexpr double kEven_s = 0.5;                // Of even speed before and after what counts.
 
 // The plane that the mirror sweeps, as elevations on one side of the pan axis.
 struct Plane {
@@ -214,6 +215,10 @@ Eigen::Isometry3d SweepMount::T_P_L() const {
                upright;
   T.translation() = P_offset_m;
   return T;
+}
+
+double run_up_rad(const SweepPlan& plan, double acceleration_radps2) {
+  return plan.rate_radps * plan.rate_radps / (2 * acceleration_radps2) + plan.rate_radps * kEven_s;
 }
 
 SweepPlan plan_sweep(const SweepField& field, const MirrorField& mirror,

@@ -65,6 +65,10 @@ struct SweepPlan {
 SweepPlan plan_sweep(const SweepField& field, const MirrorField& mirror,
                      const Eigen::Isometry3d& T_P_L);
 
+// How far the axis turns before the first and after the last profile, to be at an even speed in
+// between.
+double run_up_rad(const SweepPlan& plan, double acceleration_radps2);
+
 // How good a scan is.
 struct SweepQuality {
   std::uint32_t columns{}, columns_lost{};

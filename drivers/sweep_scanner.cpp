@@ -16,13 +16,27 @@ using errc::make_error_code;
 constexpr int kLearnFrom = 9;               // Profiles.
 constexpr int kReadings = 200;              // Of the pan angle in a sweep,
 constexpr double kReadEveryMin_s = 0.02;    // as a slow line allows.
-constexpr double kMargin_s = 0.5;           // Of constant speed before and after what counts.
+constexpr double kMargin_s = 0.25;          // Of pan angles before and after what counts.
+constexpr int kLostInARow = 5;              // Stops without a profile: then there is no scanner.
 constexpr hal::Duration kUnderWay = 300ms;  // The last profile comes so late at most.
 constexpr hal::Duration kProfilePatience = 2s;
 
 MirrorField field_of(const hal::Profile& profile, double interval_s) {
   return {profile.angle_first_rad, profile.angle_step_rad,
           static_cast<std::uint32_t>(profile.ranges_m.size()), profile.beam_period_s, interval_s};
+}
+
+std::string tenths(double angle_rad) {
+  const double tenths = std::round(angle_rad * 1800 / std::numbers::pi) / 10;
+  const std::string text = std::to_string(tenths);
+  return text.substr(0, text.find('.') + 2);
+}
+
+// Why a pan unit did not set off, as far as its error tells.
+std::string refusal(boost::system::error_code error, double angle_rad, double rate_radps) {
+  if (error != errc::argument_out_of_domain) return "";
+  return "the pan unit cannot turn to " + tenths(angle_rad) + " deg at " + tenths(rate_radps) +
+         " deg/s: narrow the field of view, or turn more slowly by a smaller azimuth step";
 }
 
 // Of the turning mirror: its jitter is smoothed away, and so are profiles that were lost.
@@ -75,8 +89,7 @@ hal::Task<hal::Result<hal::ScanCloud>> SweepScanner::measure() {
     co_return make_error_code(errc::invalid_argument);
   }
   if (config_.stop_and_go) plan.rate_radps = 0;
-  const double ramp_rad = plan.rate_radps * plan.rate_radps / (2 * config_.acceleration_radps2) +
-                          plan.rate_radps * kMargin_s;
+  const double ramp_rad = run_up_rad(plan, config_.acceleration_radps2);
   const auto there = co_await (pan_.move_to(plan.pan_first_rad - ramp_rad) || drain());
   if (const auto* moved = std::get_if<0>(&there); moved != nullptr && !*moved)
     co_return moved->error();
@@ -129,10 +142,12 @@ hal::Task<void> SweepScanner::collect(std::vector<hal::Profile>& profiles) {
 }
 
 hal::Task<hal::Result<SweepCloud>> SweepScanner::sweep(const SweepPlan& plan) {
-  const double ramp_rad = plan.rate_radps * plan.rate_radps / (2 * config_.acceleration_radps2) +
-                          plan.rate_radps * kMargin_s;
+  const double ramp_rad = run_up_rad(plan, config_.acceleration_radps2);
   const auto turned = co_await pan_.turn_to(plan.pan_last_rad + ramp_rad, plan.rate_radps);
-  if (!turned) co_return turned.error();
+  if (!turned) {
+    problem_ = refusal(turned.error(), plan.pan_last_rad + ramp_rad, plan.rate_radps);
+    co_return turned.error();
+  }
   std::vector<PanSample> samples;
   std::vector<hal::Profile> profiles;
   const auto followed = co_await (follow_pan(plan, samples) || collect(profiles));
@@ -154,7 +169,7 @@ hal::Task<hal::Result<void>> SweepScanner::follow_pan(const SweepPlan& plan,
   const double width_rad = plan.pan_last_rad - plan.pan_first_rad + plan.pan_step_rad;
   const double sweep_s = width_rad / plan.rate_radps;
   const hal::Duration every = hal::from_seconds(std::max(kReadEveryMin_s, sweep_s / kReadings));
-  const double slack_rad = plan.rate_radps * kMargin_s / 2;
+  const double slack_rad = plan.rate_radps * kMargin_s;
   const double ramps_s = 2 * plan.rate_radps / config_.acceleration_radps2;
   const hal::Time deadline = clock_.now() + hal::from_seconds(1.2 * sweep_s + ramps_s + 5);
   for (;;) {
@@ -177,6 +192,7 @@ hal::Task<hal::Result<SweepCloud>> SweepScanner::stops(const SweepPlan& plan) {
                            (plan.pan_last_rad - plan.pan_first_rad) / plan.pan_step_rad)) +
                        1;
   std::vector<StoppedProfile> taken;
+  int lost_in_a_row = 0;
   for (std::uint32_t i = 0; i < columns; ++i) {
     const auto there =
         co_await (pan_.move_to(plan.pan_first_rad + i * plan.pan_step_rad) || drain());
@@ -184,6 +200,8 @@ hal::Task<hal::Result<SweepCloud>> SweepScanner::stops(const SweepPlan& plan) {
       co_return moved->error();
     const hal::Time settled = clock_.now() + hal::from_seconds(config_.settle_s);
     StoppedProfile stopped = co_await stopped_profile(settled);
+    lost_in_a_row = stopped.lost ? lost_in_a_row + 1 : 0;
+    if (lost_in_a_row > kLostInARow) co_return make_error_code(errc::timed_out);
     const auto reading = co_await pan_.read();
     if (!reading) co_return reading.error();
     stopped.pan_rad = reading->angle_rad;

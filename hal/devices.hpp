@@ -2,6 +2,8 @@
 // here.
 #pragma once
 
+#include <functional>
+#include <string>
 #include <string_view>
 
 #include "hal/task.hpp"
@@ -83,6 +85,8 @@ struct Devices {
   Gnss& gnss;
   Scanner& scanner;
   Placement& placement;
+  // What is wrong with them now, in words for the operator; empty text: nothing. May be empty.
+  std::function<std::string()> troubles = {};
 };
 
 }  // namespace hal

@@ -35,7 +35,12 @@ struct ScannerConfig {
   double scan_s = 90.0;
   std::string device = "sick-lms5xx";
   std::string link = "tcp:192.168.0.1:2112";
-  double tilt_deg = 35.0;  // How high the profile scanner's straight ahead looks; it is upright.
+  std::string model;               // Of a Hokuyo: how what it says it is begins; empty: any.
+  std::filesystem::path metadata;  // Of an Ouster: file, relative to the robot file.
+  // How a profile scanner hangs on the pan axis, as drivers::SweepMount has it.
+  double tilt_deg = 35.0;  // How high its straight ahead looks.
+  double roll_deg = 0, yaw_deg = 0;
+  double offset_x_m = 0, offset_y_m = 0, offset_z_m = 0;  // From the pan axis, at pan angle 0.
 };
 
 // [drive] of the robot file.
@@ -55,6 +60,7 @@ struct PanConfig {
   double angle_max_deg = 185;  // To both sides: a slip-ring model; others reach 159.
   bool counter_clockwise = false;
   bool stop_and_go = false;
+  double late_s = 0;  // How much later than the profiles' the pan readings' times are.
 };
 
 // [imu], [gnss]

@@ -195,7 +195,10 @@ SectionSpec pan_section() {
            keys.other("counter_clockwise", &P::counter_clockwise,
                       "Whether positive positions turn that way seen from above"),
            keys.other("stop_and_go", &P::stop_and_go,
-                      "Stand still for every profile instead of turning evenly")},
+                      "Stand still for every profile instead of turning evenly"),
+           keys.number("late_s", &P::late_s, -1, 1, "s",
+                       "How much later than the scanner's the unit's times are; found by scanning "
+                       "both ways")},
           {},
           {}};
 }
@@ -261,10 +264,27 @@ SectionSpec scanner_section() {
                        "Between neighbouring beams of a column"),
            keys.number("scan_s", &S::scan_s, 0, 86'400, "s",
                        "Time one scan takes, for plans; the devices take what they take"),
-           keys.other("device", &S::device, "What measures", {"sick-lms5xx", "sick-lms1xx"}),
-           keys.other("link", &S::link, "Where it is: tcp:HOST:PORT"),
+           keys.other("device", &S::device, "What measures",
+                      {"sick-lms5xx", "sick-lms1xx", "hokuyo", "vlp16", "ouster"}),
+           keys.other("link", &S::link,
+                      "Where it is: tcp:HOST:PORT, serial:/dev/ttyACM1@115200, or udp:PORT for "
+                      "vlp16 and ouster, which need no pan unit"),
+           keys.other("model", &S::model,
+                      "Of a Hokuyo: how what it says it is begins, such as `UST-20LX`"),
+           keys.other("metadata", &S::metadata,
+                      "Of an Ouster: file with what it serves at /api/v1/sensor/metadata, relative "
+                      "to this file"),
            keys.number("tilt_deg", &S::tilt_deg, -90, 180, "deg",
-                       "How high a profile scanner's straight ahead looks; 90 is up")},
+                       "How high a profile scanner's straight ahead looks; 90 is up"),
+           keys.number("roll_deg", &S::roll_deg, -10, 10, "deg",
+                       "How far a profile scanner leans over to the right"),
+           keys.number("yaw_deg", &S::yaw_deg, -180, 180, "deg",
+                       "How far a profile scanner is turned to the left when the pan unit is at 0"),
+           keys.number("offset_x_m", &S::offset_x_m, -2, 2, "m",
+                       "Of a profile scanner's origin ahead of the pan axis"),
+           keys.number("offset_y_m", &S::offset_y_m, -2, 2, "m", "The same to the left"),
+           keys.number("offset_z_m", &S::offset_z_m, -2, 2, "m",
+                       "The same upwards, where height_m is not of its origin")},
           {},
           {}};
 }

@@ -8,11 +8,13 @@
 #include "drivers/serial_port.hpp"
 #include "drivers/socketcan.hpp"
 #include "drivers/tcp_stream.hpp"
+#include "drivers/udp_port.hpp"
+#include "mission/main_scanner.hpp"
 
 namespace mission {
 namespace {
 
-enum class Kind { can, stream, registers };
+enum class Kind { can, stream, registers, datagrams };
 
 struct Role {
   const char* key;  // In the robot file.
@@ -21,10 +23,14 @@ struct Role {
   bool may_be_empty;
 };
 
+const std::string kNone;
+
 std::vector<Role> roles_of(const RobotConfig& robot) {
   return {{"drive.link", robot.drive.link, Kind::can, false},
-          {"scanner.link", robot.scanner.link, Kind::stream, false},
-          {"pan.link", robot.pan.link, Kind::stream, false},
+          {"scanner.link", robot.scanner.link,
+           needs_pan(robot.scanner) ? Kind::stream : Kind::datagrams, false},
+          {"pan.link", needs_pan(robot.scanner) ? robot.pan.link : kNone, Kind::stream,
+           !needs_pan(robot.scanner)},
           {"imu.link", robot.imu.link, Kind::stream, false},
           {"gnss.link", robot.gnss.link, Kind::stream, false},
           {"power.battery_link", robot.power.battery_link, Kind::registers, true},
@@ -39,7 +45,7 @@ Kind kind_of(const drivers::LinkAddress& address) {
   if (std::holds_alternative<drivers::ModbusTcpAddress>(address) ||
       std::holds_alternative<drivers::ModbusRtuAddress>(address))
     return Kind::registers;
-  return Kind::stream;  // UDP carries no stream: see problem_of().
+  return std::holds_alternative<drivers::UdpAddress>(address) ? Kind::datagrams : Kind::stream;
 }
 
 std::string problem_of(const Role& role) {
@@ -49,13 +55,14 @@ std::string problem_of(const Role& role) {
   const auto parsed = drivers::parse_link_address(role.address);
   if (const auto* error = std::get_if<drivers::AddressError>(&parsed)) return error->what;
   const auto& address = std::get<drivers::LinkAddress>(parsed);
-  if (kind_of(address) == role.kind && !std::holds_alternative<drivers::UdpAddress>(address))
-    return "";
+  if (kind_of(address) == role.kind) return "";
   switch (role.kind) {
     case Kind::can:
       return "a drive hangs on CAN: can:can0 or gs_usb:SERIAL/CHANNEL@500000";
     case Kind::stream:
       return "this device speaks on a stream: serial:/dev/ttyUSB0@9600 or tcp:HOST:PORT";
+    case Kind::datagrams:
+      return "this scanner sends packets: udp:PORT, or udp:PORT@ADDRESS for those from there only";
     case Kind::registers:
       return "this device speaks Modbus: modbus-tcp:HOST:502/UNIT or "
              "modbus-rtu:/dev/ttyUSB0@9600N/UNIT";
@@ -89,8 +96,12 @@ HardwareLinks::HardwareLinks(const RobotConfig& config,
                              const boost::asio::any_io_executor& executor, hal::Clock& clock)
     : executor_(executor), clock_(clock) {
   ends_.drive = open_can("drive", config.drive.link);
-  ends_.scanner = open_stream("scanner", config.scanner.link);
-  ends_.pan = open_stream("pan", config.pan.link);
+  if (needs_pan(config.scanner)) {
+    ends_.scanner = open_stream("scanner", config.scanner.link);
+    ends_.pan = open_stream("pan", config.pan.link);
+  } else {
+    ends_.packets = open_datagrams("scanner", config.scanner.link);
+  }
   ends_.imu = open_stream("imu", config.imu.link);
   ends_.gnss = open_stream("gnss", config.gnss.link);
   ends_.power.battery = open_registers("power", config.power.battery_link);
@@ -138,6 +149,14 @@ hal::ByteStream* HardwareLinks::open_stream(const std::string& role, const std::
   owned_.push_back(stream);
   named_.push_back({role, stream.get()});
   return stream.get();
+}
+
+hal::Datagrams* HardwareLinks::open_datagrams(const std::string& role, const std::string& address) {
+  auto port = std::make_shared<drivers::UdpPort>(std::get<drivers::UdpAddress>(parsed(address)),
+                                                 executor_, clock_);
+  owned_.push_back(port);
+  named_.push_back({role, port.get()});
+  return port.get();
 }
 
 // Units on one line share it.

@@ -40,6 +40,7 @@ class HardwareLinks {
  private:
   hal::CanBus* open_can(const std::string& role, const std::string& address);
   hal::ByteStream* open_stream(const std::string& role, const std::string& address);
+  hal::Datagrams* open_datagrams(const std::string& role, const std::string& address);
   hal::Registers* open_registers(const std::string& role, const std::string& address);
 
   boost::asio::any_io_executor executor_;

@@ -10,24 +10,23 @@
 #include "drivers/cia402_drive.hpp"
 #include "drivers/flir_ptu.hpp"
 #include "drivers/gpsd_client.hpp"
+#include "drivers/hokuyo.hpp"
 #include "drivers/nmea_gnss.hpp"
+#include "drivers/ouster.hpp"
 #include "drivers/sick_lms.hpp"
 #include "drivers/ublox.hpp"
+#include "drivers/velodyne.hpp"
 #include "drivers/vn100.hpp"
 #include "hal/together.hpp"
+#include "mission/main_scanner.hpp"
 
 namespace mission {
 namespace {
 
 constexpr hal::Duration kLook = std::chrono::milliseconds(100);
-constexpr double kPanAcceleration_radps2 = 0.5;
 
 constexpr double radians(double degrees) {
   return degrees * std::numbers::pi / 180;
-}
-
-bool is_lms5xx(const ScannerConfig& scanner) {
-  return scanner.device == "sick-lms5xx";
 }
 
 // Where a link can change its rate, its own file says so; in memory there is none to change.
@@ -51,91 +50,7 @@ drivers::Cia402Drive::Config cia402_config(const RobotConfig& config) {
   return result;
 }
 
-drivers::SweepField field_of(const ScannerConfig& scanner) {
-  return {.fov_rad = radians(scanner.fov_deg),
-          .elevation_min_rad = radians(scanner.elevation_min_deg),
-          .elevation_max_rad = radians(scanner.elevation_max_deg),
-          .azimuth_step_rad = radians(scanner.azimuth_step_deg)};
-}
-
-// Device angles of an LMS: 90 degrees is straight ahead.
-struct Arc {
-  double first_deg, last_deg;
-};
-constexpr Arc kLms1xx{-45, 225}, kLms5xx{-5, 185};
-
-drivers::MirrorField mirror_of(const drivers::LmsSettings& settings) {
-  const double step_deg = settings.resolution_1e4deg / 1e4;
-  const double turn_s = 100.0 / settings.frequency_centihz;
-  return {.angle_first_rad = radians(settings.start_1e4deg / 1e4 - 90),
-          .angle_step_rad = radians(step_deg),
-          .beams = static_cast<std::uint32_t>(
-              std::lround((settings.stop_1e4deg - settings.start_1e4deg) / 1e4 / step_deg) + 1),
-          .beam_period_s = turn_s * step_deg / 360,
-          .interval_s = turn_s};
-}
-
 }  // namespace
-
-drivers::SweepMount mount_of(const ScannerConfig& scanner) {
-  return {.tilt_rad = radians(scanner.tilt_deg)};
-}
-
-// The whole arc where half a turn of the pan axis then shows all; else no more than is wanted.
-drivers::LmsSettings lms_settings(const ScannerConfig& scanner) {
-  const Arc arc = is_lms5xx(scanner) ? kLms5xx : kLms1xx;
-  const auto device_deg = [&](double elevation_deg) {
-    return 90 + elevation_deg - scanner.tilt_deg;
-  };
-  drivers::LmsSettings settings;
-  settings.lms5xx = is_lms5xx(scanner);
-  settings.resolution_1e4deg =
-      static_cast<std::int32_t>(std::lround(1e4 * scanner.elevation_step_deg));
-  Arc wanted{device_deg(scanner.elevation_min_deg), device_deg(scanner.elevation_max_deg)};
-  if (device_deg(180 - scanner.elevation_min_deg) <= arc.last_deg) wanted = arc;
-  const auto whole_steps = [&](double angle_deg) {
-    return std::lround(1e4 * (angle_deg - arc.first_deg) / settings.resolution_1e4deg);
-  };
-  const auto start = std::lround(1e4 * arc.first_deg);
-  settings.start_1e4deg = static_cast<std::int32_t>(
-      start + whole_steps(std::max(wanted.first_deg, arc.first_deg)) * settings.resolution_1e4deg);
-  settings.stop_1e4deg = static_cast<std::int32_t>(
-      start + whole_steps(std::min(wanted.last_deg, arc.last_deg)) * settings.resolution_1e4deg);
-  for (const std::int32_t frequency : {5000, 3500, 2500}) {  // The fastest that it has.
-    settings.frequency_centihz = frequency;
-    if (drivers::lms_settings_problem(settings).empty()) break;
-  }
-  return settings;
-}
-
-std::vector<ConfigError> robot_problems(const MissionConfig& config) {
-  const ScannerConfig& scanner = config.robot.scanner;
-  std::vector<ConfigError> errors;
-  const auto add = [&](const std::string& key, const std::string& message) {
-    const auto written = config.written.find("robot." + key);
-    const ConfigPlace place = written == config.written.end()
-                                  ? ConfigPlace{config.robot_file.generic_string(), 0, 0}
-                                  : written->second;
-    errors.push_back({place.file, place.line, place.column, message});
-  };
-  const drivers::LmsSettings settings = lms_settings(scanner);
-  if (const std::string problem = drivers::lms_settings_problem(settings); !problem.empty()) {
-    add("scanner.elevation_step_deg", problem);
-    return errors;
-  }
-  const drivers::SweepPlan plan =
-      drivers::plan_sweep(field_of(scanner), mirror_of(settings), mount_of(scanner).T_P_L());
-  if (!plan.problem.empty()) add("scanner.tilt_deg", plan.problem);
-  const double turned_deg =
-      std::max(std::abs(plan.pan_first_rad), std::abs(plan.pan_last_rad)) * 180 / std::numbers::pi;
-  if (turned_deg > config.robot.pan.angle_max_deg)
-    add("pan.angle_max_deg",
-        fmt::format(
-            "this field of view needs the pan unit to turn {:.0f} deg to both sides, and it "
-            "turns {:.0f}: narrow [scanner] fov_deg, or use a slip-ring model",
-            turned_deg, config.robot.pan.angle_max_deg));
-  return errors;
-}
 
 template <class T>
 T& RobotDrivers::own(std::string role, std::string link, std::unique_ptr<T> device) {
@@ -178,10 +93,39 @@ void RobotDrivers::add_drive(const RobotConfig& config, const Links& links) {
 }
 
 void RobotDrivers::add_scanner(const RobotConfig& config, const Links& links) {
-  auto& lms = own("scanner", config.scanner.link,
-                  std::make_unique<drivers::SickLms>(
-                      drivers::SickLmsConfig{.settings = lms_settings(config.scanner)}, clock_,
-                      *links.scanner));
+  const ScannerConfig& scanner = config.scanner;
+  if (scanner.device == "vlp16") {
+    drivers::VelodyneConfig velodyne;
+    add_turning(config, std::make_unique<drivers::Velodyne>(velodyne, clock_, *links.packets));
+  } else if (scanner.device == "ouster") {
+    drivers::OusterConfig ouster{.scan = {}, .metadata = ouster_file(scanner).metadata};
+    add_turning(config,
+                std::make_unique<drivers::Ouster>(std::move(ouster), clock_, *links.packets));
+  } else if (scanner.device == "hokuyo") {
+    drivers::HokuyoConfig hokuyo;
+    hokuyo.model = scanner.model;
+    auto& device = own("scanner", scanner.link,
+                       std::make_unique<drivers::Hokuyo>(hokuyo, clock_, *links.scanner));
+    add_sweep(config, links, device, [&device] { return device.clock_jitter_s(); });
+  } else {
+    const drivers::SickLmsConfig sick{.settings = lms_settings(scanner)};
+    auto& device = own("scanner", scanner.link,
+                       std::make_unique<drivers::SickLms>(sick, clock_, *links.scanner));
+    add_sweep(config, links, device, [&device] { return device.clock_jitter_s(); });
+  }
+}
+
+// A 3-D scanner by itself.
+template <class T>
+void RobotDrivers::add_turning(const RobotConfig& config, std::unique_ptr<T> scanner) {
+  T& device = own("scanner", config.scanner.link, std::move(scanner));
+  scanner_ = &device;
+  scan_problem_ = [&device]() -> const std::string& { return device.problem(); };
+}
+
+void RobotDrivers::add_sweep(const RobotConfig& config, const Links& links,
+                             hal::ProfileScanner& profiles,
+                             std::function<double()> clock_jitter_s) {
   drivers::FlirPtuConfig ptu;
   ptu.counter_clockwise = config.pan.counter_clockwise;
   ptu.angle_max_rad = radians(config.pan.angle_max_deg);
@@ -194,8 +138,11 @@ void RobotDrivers::add_scanner(const RobotConfig& config, const Links& links) {
   sweep.field = field_of(config.scanner);
   sweep.stop_and_go = config.pan.stop_and_go;
   sweep.acceleration_radps2 = kPanAcceleration_radps2;
-  sweep.clock_jitter_s = [&lms] { return lms.clock_jitter_s(); };
-  sweep_ = std::make_unique<drivers::SweepScanner>(sweep, clock_, lms, pan);
+  sweep.pan_late_s = config.pan.late_s;
+  sweep.clock_jitter_s = std::move(clock_jitter_s);
+  sweep_ = std::make_unique<drivers::SweepScanner>(sweep, clock_, profiles, pan);
+  scanner_ = sweep_.get();
+  scan_problem_ = [this]() -> const std::string& { return sweep_->problem(); };
 }
 
 void RobotDrivers::add_gnss(const RobotConfig& config,
@@ -248,9 +195,22 @@ hal::Task<hal::Result<void>> RobotDrivers::started(hal::Duration patience) {
 }
 
 std::string RobotDrivers::not_running() const {
+  return told([](const auto& device) { return device.state() != drivers::DeviceState::running; });
+}
+
+std::string RobotDrivers::complaints() const {
+  std::string text = told([](const auto& device) {
+    return device.state() != drivers::DeviceState::running || !device.troubles().empty();
+  });
+  const std::string& scan = scan_problem();
+  if (!scan.empty()) text += (text.empty() ? "" : "; ") + ("the last scan: " + scan);
+  return text;
+}
+
+std::string RobotDrivers::told(const std::function<bool(const drivers::Device&)>& of) const {
   std::string text;
   for (const NamedDevice& named : devices_) {
-    if (named.device->state() == drivers::DeviceState::running) continue;
+    if (!of(*named.device)) continue;
     text += fmt::format("{}{} ({} at {})", text.empty() ? "" : "; ", named.role,
                         named.device->model(), named.link);
     for (const drivers::Trouble& trouble : named.device->troubles())

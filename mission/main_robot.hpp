@@ -10,7 +10,6 @@
 
 #include "drivers/device.hpp"
 #include "drivers/power_io.hpp"
-#include "drivers/sick_lms_startup.hpp"
 #include "drivers/site_frame.hpp"
 #include "drivers/sweep_scanner.hpp"
 #include "hal/clock.hpp"
@@ -35,6 +34,7 @@ class RobotDrivers {
   struct Links {
     hal::CanBus* drive{};
     hal::ByteStream *scanner{}, *pan{}, *imu{}, *gnss{};
+    hal::Datagrams* packets{};      // Of a scanner that sends them: then no other scanner and pan.
     drivers::PowerIo::Links power;  // Null where the robot has none.
   };
 
@@ -47,8 +47,7 @@ class RobotDrivers {
   hal::Drive& drive() { return *drive_; }
   hal::Imu& imu() { return *imu_; }
   hal::Gnss& gnss() { return *gnss_; }
-  hal::Scanner& scanner() { return *sweep_; }
-  drivers::SweepScanner& sweep() { return *sweep_; }
+  hal::Scanner& scanner() { return *scanner_; }
 
   const std::vector<NamedDevice>& devices() const { return devices_; }
 
@@ -60,15 +59,24 @@ class RobotDrivers {
   std::string not_running() const;
   // Before the program ends: the robot stands, and the drive is given back.
   hal::Task<void> release() { return release_drive_(); }
+  // All that is wrong now, with the remedies; empty: nothing.
+  std::string complaints() const;
+  // Why the last scan was not good enough; empty: it was, or there was none.
+  const std::string& scan_problem() const { return scan_problem_(); }
 
  private:
   void add_drive(const RobotConfig& config, const Links& links);
   void add_scanner(const RobotConfig& config, const Links& links);
+  void add_sweep(const RobotConfig& config, const Links& links, hal::ProfileScanner& profiles,
+                 std::function<double()> clock_jitter_s);
+  template <class T>
+  void add_turning(const RobotConfig& config, std::unique_ptr<T> scanner);
   void add_gnss(const RobotConfig& config, const std::optional<drivers::GeoAnchor>& anchor,
                 const Links& links);
   void add_power(const RobotConfig& config, const Links& links);
   template <class T>
   T& own(std::string role, std::string link, std::unique_ptr<T> device);
+  std::string told(const std::function<bool(const drivers::Device&)>& of) const;
 
   hal::Clock& clock_;
   std::vector<std::unique_ptr<drivers::Device>> owned_;
@@ -78,10 +86,8 @@ class RobotDrivers {
   hal::Imu* imu_{};
   hal::Gnss* gnss_{};
   std::unique_ptr<drivers::SweepScanner> sweep_;
+  hal::Scanner* scanner_{};
+  std::function<const std::string&()> scan_problem_;
 };
-
-// How the profile scanner hangs on the pan axis, as the robot file says; and what it is set to.
-drivers::SweepMount mount_of(const ScannerConfig& scanner);
-drivers::LmsSettings lms_settings(const ScannerConfig& scanner);
 
 }  // namespace mission

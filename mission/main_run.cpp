@@ -44,7 +44,8 @@ hal::Task<void> start_and_survey(RobotDrivers& drivers, Survey& survey) {
 }
 
 // Runs the survey to its end; returns what went wrong, or "".
-std::string run_survey(SimBackend& backend, Survey& survey) {
+std::string run_survey(SimBackend& backend, Survey& survey,
+                       const std::function<void(SimBackend&)>& watch) {
   bool ended = false;
   std::string failure;
   const auto on_end = [&](std::exception_ptr error) {
@@ -56,7 +57,11 @@ std::string run_survey(SimBackend& backend, Survey& survey) {
     }
   };
   boost::asio::co_spawn(backend.io(), start_and_survey(backend.drivers(), survey), on_end);
-  if (!backend.run([&] { return ended; }))
+  const auto done = [&] {
+    if (watch) watch(backend);
+    return ended;
+  };
+  if (!backend.run(done))
     return backend.failure().empty() ? "the mission waits for something that cannot come"
                                      : backend.failure();
   return failure;
@@ -130,7 +135,7 @@ RunOutcome run_in_simulation(Prepared& prepared, const RunOptions& options) {
   RunRecord& record = survey.record();
   record.repairs = prepared.site.repairs;
   record.notes.insert(record.notes.begin(), prepared.notes.begin(), prepared.notes.end());
-  std::string failure = run_survey(backend, survey);
+  std::string failure = run_survey(backend, survey, options.watch);
   progress.finish();
   record.truth = backend.judge(record, survey.model(), prepared.tasks.tasks, options.judge_cells);
   save_products(store, survey);

@@ -43,8 +43,9 @@ struct RunOptions {
   std::filesystem::path out;          // Folder for the run's products.
   std::filesystem::path judge_cells;  // See SimBackend::judge.
   int threads = 1;
-  std::ostream* progress = nullptr;  // Null: says nothing.
-  bool terminal = false;             // Whether `progress` is one.
+  std::ostream* progress = nullptr;             // Null: says nothing.
+  bool terminal = false;                        // Whether `progress` is one.
+  std::function<void(SimBackend&)> watch = {};  // Called as time goes on, to break something.
 };
 
 struct RunOutcome {

@@ -147,8 +147,12 @@ SimBackend::SimBackend(const MissionConfig& config, const SiteTasks& tasks, SimS
       robot_(config.robot, kSimAnchor, config.seed, threads, true_site_.world(), clock_),
       scanner_(robot_.drivers().scanner(), true_site_.world(), clock_),
       placement_(true_site_.world(), clock_),
-      devices_{robot_.drivers().drive(), robot_.drivers().imu(), robot_.drivers().gnss(), scanner_,
-               placement_} {}
+      devices_{robot_.drivers().drive(),
+               robot_.drivers().imu(),
+               robot_.drivers().gnss(),
+               scanner_,
+               placement_,
+               [this] { return robot_.drivers().complaints(); }} {}
 
 bool SimBackend::run(const std::function<bool()>& done) {
   if (!started_)

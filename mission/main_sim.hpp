@@ -66,6 +66,7 @@ class SimBackend {
   boost::asio::io_context& io() { return io_; }
   RobotDrivers& drivers() { return robot_.drivers(); }
   RobotUnits& units() { return robot_.units(); }
+  SimulatedRobot& robot() { return robot_; }
   // Starts units and drivers, and runs until done() holds. False when they ended by themselves, or
   // nothing is left to run: failure() may say why.
   bool run(const std::function<bool()>& done);

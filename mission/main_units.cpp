@@ -3,6 +3,7 @@
 #include <numbers>
 
 #include "hal/together.hpp"
+#include "mission/main_scanner.hpp"
 
 namespace mission {
 namespace {
@@ -33,7 +34,8 @@ RobotUnits::RobotUnits(const RobotConfig& config, const drivers::GeoAnchor& anch
                        const UnitLinks& links)
     : seed_(seed), world_(world), clock_(clock), supply_(sim::BatteryConfig{}, world) {
   if (links.drive) add_drive(config, links);
-  if (links.scanner && links.pan) add_scanner(config, threads, links);
+  if (links.scanner && links.pan && needs_pan(config.scanner)) add_sweep(config, threads, links);
+  if (links.packets && !needs_pan(config.scanner)) add_turning(config.scanner, *links.packets);
   if (links.imu)
     imu_.emplace(sim::Vn100UnitConfig{}, world_, clock_, *links.imu, add_faults("imu"));
   if (links.gnss) add_gnss(config, anchor, links);
@@ -70,7 +72,7 @@ void RobotUnits::add_drive(const RobotConfig& config, const UnitLinks& links) {
   agilex_.emplace(agilex, world_, &supply_, clock_, *links.drive, faults);
 }
 
-void RobotUnits::add_scanner(const RobotConfig& config, int threads, const UnitLinks& links) {
+void RobotUnits::add_sweep(const RobotConfig& config, int threads, const UnitLinks& links) {
   sim::FlirPtuUnitConfig ptu;
   ptu.arcsec_per_step = kArcsecPerStep;
   ptu.counter_clockwise = config.pan.counter_clockwise;
@@ -78,6 +80,16 @@ void RobotUnits::add_scanner(const RobotConfig& config, int threads, const UnitL
   ptu.reset_time = {};  // It was on before the computer was.
   ptu.seed = seed_;
   ptu_.emplace(ptu, clock_, *links.pan, add_faults("pan"));
+  if (config.scanner.device == "hokuyo") {
+    sim::HokuyoUnitConfig hokuyo;
+    hokuyo.parameters = hokuyo_parameters(config.scanner.model);
+    hokuyo.T_P_L = mount_of(config.scanner).T_P_L();
+    hokuyo.ranges = world_.config().scanner;
+    hokuyo.seed = seed_;
+    hokuyo.threads = threads;
+    hokuyo_.emplace(hokuyo, world_, clock_, *links.scanner, add_faults("scanner"), *ptu_);
+    return;
+  }
   sim::SickLmsUnitConfig lms;
   lms.lms5xx = config.scanner.device == "sick-lms5xx";
   lms.long_range = lms.lms5xx && config.scanner.range_max_m > kShortRangeMax_m;
@@ -86,6 +98,23 @@ void RobotUnits::add_scanner(const RobotConfig& config, int threads, const UnitL
   lms.seed = seed_;
   lms.threads = threads;
   lms_.emplace(lms, world_, clock_, *links.scanner, add_faults("scanner"), *ptu_);
+}
+
+void RobotUnits::add_turning(const ScannerConfig& config, sim::DatagramSender& packets) {
+  if (config.device == "ouster") {
+    sim::OusterUnitConfig ouster;
+    ouster.metadata = ouster_file(config).metadata;
+    ouster.ranges = world_.config().scanner;
+    ouster.seed = seed_;
+    ouster.blind_in_motion = true;
+    ouster_.emplace(std::move(ouster), world_, clock_, packets, add_faults("scanner"));
+    return;
+  }
+  sim::VelodyneUnitConfig velodyne;
+  velodyne.ranges = world_.config().scanner;
+  velodyne.seed = seed_;
+  velodyne.blind_in_motion = true;
+  velodyne_.emplace(velodyne, world_, clock_, packets, add_faults("scanner"));
 }
 
 void RobotUnits::add_gnss(const RobotConfig& config, const drivers::GeoAnchor& anchor,
@@ -124,6 +153,9 @@ hal::Task<void> RobotUnits::run() {
   add(cia402_);
   add(ptu_);
   add(lms_);
+  add(hokuyo_);
+  add(velodyne_);
+  add(ouster_);
   add(imu_);
   add(ublox_);
   add(nmea_);
@@ -135,14 +167,15 @@ hal::Task<void> RobotUnits::run() {
 SimulatedRobot::SimulatedRobot(const RobotConfig& config, const drivers::GeoAnchor& anchor,
                                std::uint64_t seed, int threads, sim::World& world,
                                hal::Clock& clock)
-    : can_(clock), scanner_(clock), pan_(clock), imu_(clock), gnss_(clock) {
+    : can_(clock), scanner_(clock), pan_(clock), imu_(clock), gnss_(clock), packets_(clock) {
   hal::CanBus& drivers_end = can_.attach();
   const UnitLinks ends{.drive = &can_.attach(),
                        .second_drive = config.drive.device == "cia402" ? &can_.attach() : nullptr,
                        .scanner = &scanner_.b(),
                        .pan = &pan_.b(),
                        .imu = &imu_.b(),
-                       .gnss = &gnss_.b()};
+                       .gnss = &gnss_.b(),
+                       .packets = &packets_.sender()};
   units_ = std::make_unique<RobotUnits>(config, anchor, seed, threads, world, clock, ends);
   const auto registers = [&](sim::RegisterUnit* unit) -> hal::Registers* {
     if (!unit) return nullptr;
@@ -155,6 +188,7 @@ SimulatedRobot::SimulatedRobot(const RobotConfig& config, const drivers::GeoAnch
                           .pan = &pan_.a(),
                           .imu = &imu_.a(),
                           .gnss = &gnss_.a(),
+                          .packets = &packets_.receiver(),
                           .power = {.battery = registers(units_->battery()),
                                     .gateway = nullptr,
                                     .board = registers(units_->board()),

@@ -17,12 +17,15 @@
 #include "sim/cia402_unit.hpp"
 #include "sim/flir_ptu_unit.hpp"
 #include "sim/gpsd_unit.hpp"
+#include "sim/hokuyo_unit.hpp"
 #include "sim/links.hpp"
 #include "sim/nmea_unit.hpp"
+#include "sim/ouster_unit.hpp"
 #include "sim/power_units.hpp"
 #include "sim/sick_lms_unit.hpp"
 #include "sim/ublox_unit.hpp"
 #include "sim/unit_faults.hpp"
+#include "sim/velodyne_unit.hpp"
 #include "sim/vn100_unit.hpp"
 #include "sim/world.hpp"
 
@@ -36,6 +39,7 @@ struct UnitLinks {
   // An AgileX base uses the first end of the bus, two CiA 402 drives one each.
   hal::CanBus *drive{}, *second_drive{};
   hal::ByteStream *scanner{}, *pan{}, *imu{}, *gnss{};
+  sim::DatagramSender* packets{};  // Of a scanner that turns by itself.
 };
 
 // Which faults the units have, by role: "drive", "drive2" (the right one of two), "scanner", "pan",
@@ -49,6 +53,9 @@ class RobotUnits {
   // Null for a role that is not there.
   sim::UnitFaults* faults(std::string_view role);
   // Modbus units; null where the robot has none.
+  // The drive's; the other one is null.
+  sim::AgilexUnit* agilex() { return agilex_ ? &*agilex_ : nullptr; }
+  sim::Cia402Unit* cia402() { return cia402_ ? &*cia402_ : nullptr; }
   sim::RegisterUnit* battery() { return victron_ ? &*victron_ : nullptr; }
   sim::RegisterUnit* board() { return board_ ? &*board_ : nullptr; }
   sim::RegisterUnit* safety() { return pilz_ ? &*pilz_ : nullptr; }
@@ -62,7 +69,8 @@ class RobotUnits {
   };
   sim::UnitFaults& add_faults(std::string role);
   void add_drive(const RobotConfig& config, const UnitLinks& links);
-  void add_scanner(const RobotConfig& config, int threads, const UnitLinks& links);
+  void add_sweep(const RobotConfig& config, int threads, const UnitLinks& links);
+  void add_turning(const ScannerConfig& config, sim::DatagramSender& packets);
   void add_gnss(const RobotConfig& config, const drivers::GeoAnchor& anchor,
                 const UnitLinks& links);
   void add_power(const PowerConfig& config);
@@ -76,6 +84,9 @@ class RobotUnits {
   std::optional<sim::Cia402Unit> cia402_;
   std::optional<sim::FlirPtuUnit> ptu_;
   std::optional<sim::SickLmsUnit> lms_;
+  std::optional<sim::HokuyoUnit> hokuyo_;
+  std::optional<sim::VelodyneUnit> velodyne_;
+  std::optional<sim::OusterUnit> ouster_;
   std::optional<sim::Vn100Unit> imu_;
   std::optional<sim::UbloxUnit> ublox_;
   std::optional<sim::NmeaUnit> nmea_;
@@ -94,11 +105,13 @@ class SimulatedRobot {
 
   RobotDrivers& drivers() { return *drivers_; }
   RobotUnits& units() { return *units_; }
+  sim::CanWire& can() { return can_; }
   hal::Task<void> run();  // Units and drivers. Ends only by cancellation.
 
  private:
   sim::CanWire can_;
   sim::StreamWire scanner_, pan_, imu_, gnss_;
+  sim::DatagramWire packets_;
   std::unique_ptr<RobotUnits> units_;
   std::vector<std::unique_ptr<sim::RegisterWire>> registers_;
   std::unique_ptr<RobotDrivers> drivers_;

@@ -137,7 +137,7 @@ hal::Task<hal::Result<hal::ScanCloud>> WatchedScanner::scan() {
     co_await watch_.until_well();
     auto cloud = co_await drivers_.scanner().scan();
     if (cloud) co_return cloud;
-    const std::string& problem = drivers_.sweep().problem();
+    const std::string& problem = drivers_.scan_problem();
     watch_.note(fmt::format("scan failed, try {} of {}: {}", tries, kTriesMax,
                             problem.empty() ? cloud.error().message() : problem));
     if (tries == kTriesMax) co_return cloud;

@@ -13,6 +13,12 @@ constexpr hal::Duration kHaltWait = std::chrono::seconds(2);
 constexpr double kObstacleAheadM = 0.35;  // Beyond the bumper, when something was touched.
 constexpr double kTouchedSideM = 0.6;     // Square that is closed around the spot.
 constexpr double kBackOffM = 0.5;
+// How long a drive may not obey: a cable or a restart takes less, a person at an e-stop more.
+constexpr hal::Duration kLostPatience = std::chrono::minutes(2);
+constexpr hal::Duration kHeldPatience = std::chrono::minutes(10);
+constexpr hal::Duration kAskAgain = std::chrono::milliseconds(200);
+
+namespace errc = boost::system::errc;
 
 constexpr double radians(double degrees) {
   return degrees * std::numbers::pi / 180;
@@ -31,6 +37,22 @@ hal::Duration time_allowed(const BodyConfig& body, const nav::Route& route) {
   return hal::from_seconds(60 + 3 * route.length_m / body.speed_max_mps +
                            static_cast<double>(route.points_m.size()) * 2 * std::numbers::pi /
                                radians(body.turn_max_degps));
+}
+
+bool is_held(boost::system::error_code why) {
+  return why == errc::operation_not_permitted;
+}
+
+// Why the drive does not obey, in words; what the devices say of themselves is added.
+std::string drive_reason(boost::system::error_code why, hal::Duration waited,
+                         const hal::Devices& devices) {
+  std::string reason =
+      is_held(why) ? "the drive is held by its e-stop, a remote control or a fault of its own"
+      : why == errc::not_connected ? "the drive does not answer or is not in command"
+                                   : "the drive fails: " + why.message();
+  reason += fmt::format(", for {:.0f} s", hal::seconds(waited));
+  const std::string said = devices.troubles ? devices.troubles() : "";
+  return said.empty() ? reason : reason + " (" + said + ")";
 }
 
 // The start pose comes from survey marks or the operator's care: a few centimetres, a degree.
@@ -86,13 +108,23 @@ hal::Task<void> Pilot::track_travel() {
 }
 
 hal::Task<void> Pilot::track_imu() {
-  for (;;) localizer_.predict((co_await devices_.imu.next_sample()).value());
+  for (;;) {
+    const auto sample = co_await devices_.imu.next_sample();
+    if (sample)
+      localizer_.predict(*sample);
+    else  // The wheels tell the turns meanwhile.
+      co_await clock_.sleep_for(kAskAgain);
+  }
 }
 
 hal::Task<void> Pilot::track_gnss() {
   for (;;) {
-    const hal::GnssFix fix = (co_await devices_.gnss.next_fix()).value();
-    const nav::Gate gate = localizer_.correct(fix);
+    const auto fix = co_await devices_.gnss.next_fix();
+    if (!fix) {
+      co_await clock_.sleep_for(kAskAgain);
+      continue;
+    }
+    const nav::Gate gate = localizer_.correct(*fix);
     ++gnss_.fixes;
     gnss_.refused += gate == nav::Gate::rejected;
     gnss_.resets += gate == nav::Gate::reset;
@@ -111,6 +143,8 @@ hal::Task<LegEnd> Pilot::drive_to(Roads& roads, hal::Pose2 goal) {
     }
     const RouteEnd end = co_await follow_route(*route, goal, leg);
     leg.arrived = end == RouteEnd::arrived;
+    leg.drive_lost = end == RouteEnd::drive_lost;
+    if (leg.drive_lost) break;
     if (end != RouteEnd::blocked) continue;  // There, or from here by another route.
     leg.reason = fmt::format("the way was blocked {} times", tries + 1);
     const hal::Pose2 here = pose();
@@ -129,7 +163,7 @@ hal::Task<Pilot::RouteEnd> Pilot::follow_route(const nav::Route& route, hal::Pos
   const nav::FollowConfig config = follow_config(config_.body);
   const nav::Path path = nav::path_along(route, goal.heading_rad);
   nav::FollowState state;
-  const hal::Time late = clock_.now() + time_allowed(config_.body, route);
+  hal::Time late = clock_.now() + time_allowed(config_.body, route);
   RouteEnd end = RouteEnd::given_up;
   leg.reason = "the robot did not get there in the time allowed";
   while (clock_.now() < late) {
@@ -140,19 +174,48 @@ hal::Task<Pilot::RouteEnd> Pilot::follow_route(const nav::Route& route, hal::Pos
       leg.reason = nav::name(state.phase);
       break;
     }
-    if (!co_await devices_.drive.command(twist)) {
-      end = RouteEnd::blocked;
+    const hal::Time told_at = clock_.now();
+    const auto failed = co_await tell_drive(twist, leg);
+    if (failed) {
+      end = failed == errc::io_error ? RouteEnd::blocked : RouteEnd::drive_lost;
       break;
     }
+    late += clock_.now() - told_at;  // What it waited for the drive.
     co_await clock_.sleep_for(kControlPeriod);
   }
   co_await halt();
   co_return end;
 }
 
-// Stops, and waits until the robot stands still.
+// errc::io_error: the way is blocked. Any other error: the drive did not come back in time, and the
+// leg has the reason.
+hal::Task<boost::system::error_code> Pilot::tell_drive(hal::Twist twist, LegEnd& leg) {
+  const auto told = co_await devices_.drive.command(twist);
+  if (told) co_return boost::system::error_code{};
+  if (told.error() == errc::io_error) co_return told.error();
+  co_return co_await wait_for_drive(told.error(), leg);
+}
+
+// Until it obeys again, standing. What holds it may change on the way: each has its own patience.
+hal::Task<boost::system::error_code> Pilot::wait_for_drive(boost::system::error_code why,
+                                                           LegEnd& leg) {
+  const hal::Time began = clock_.now();
+  for (;;) {
+    const hal::Duration waited = clock_.now() - began;
+    if (waited >= (is_held(why) ? kHeldPatience : kLostPatience)) {
+      leg.reason = drive_reason(why, waited, devices_);
+      co_return why;
+    }
+    co_await clock_.sleep_for(kAskAgain);
+    const auto told = co_await devices_.drive.command({});
+    if (told) co_return boost::system::error_code{};
+    why = told.error();
+  }
+}
+
+// Stops, and waits until the robot stands still. A drive that does not hear this stops by itself.
 hal::Task<void> Pilot::halt() {
-  (co_await devices_.drive.command({})).value();
+  (void)co_await devices_.drive.command({});
   co_await clock_.sleep_for(kHaltWait);
 }
 

@@ -19,6 +19,7 @@ namespace mission {
 // How a leg ended. Not arrived: why, in words for the operator.
 struct LegEnd {
   bool arrived{};
+  bool drive_lost{};  // It did not come back in time: nothing more can be driven.
   std::string reason;
   double driven_m{};
   std::vector<Eigen::Vector2d> track_m;  // Believed positions, about one per metre.
@@ -36,12 +37,14 @@ class Pilot {
  public:
   Pilot(const RobotConfig& config, hal::Clock& clock, hal::Devices& devices, hal::Pose2 start);
 
-  // Runs beside the mission and keeps the pose current; ends only by cancellation or when a device
-  // is gone for good (throws boost::system::system_error).
+  // Runs beside the mission and keeps the pose current, without IMU or satellites where these are
+  // lost. Ends only by cancellation, or when the wheels' travel cannot be had (throws
+  // boost::system::system_error).
   hal::Task<void> track();
 
   // Drives to the goal, at most kTriesMax routes: when the way turns out to be blocked, closes
-  // that spot on the roads and looks for another way.
+  // that spot on the roads and looks for another way. While the drive does not obey (lost, or held
+  // by an e-stop) it waits, for a bounded time, and then goes on where it stands.
   hal::Task<LegEnd> drive_to(Roads& roads, hal::Pose2 goal);
 
   hal::Pose2 pose() const { return localizer_.pose(); }
@@ -50,12 +53,14 @@ class Pilot {
 
  private:
   static constexpr int kTriesMax = 3;
-  enum class RouteEnd { arrived, blocked, given_up };
+  enum class RouteEnd { arrived, blocked, given_up, drive_lost };
 
   hal::Task<void> track_travel();
   hal::Task<void> track_imu();
   hal::Task<void> track_gnss();
   hal::Task<RouteEnd> follow_route(const nav::Route& route, hal::Pose2 goal, LegEnd& leg);
+  hal::Task<boost::system::error_code> tell_drive(hal::Twist twist, LegEnd& leg);
+  hal::Task<boost::system::error_code> wait_for_drive(boost::system::error_code why, LegEnd& leg);
   hal::Task<void> back_off();
   hal::Task<void> halt();
   void note_track(LegEnd& leg) const;

@@ -12,6 +12,21 @@ namespace mission {
 namespace {
 
 namespace json = boost::json;
+namespace errc = boost::system::errc;
+
+constexpr int kScanTries = 3;  // At a stop,
+constexpr hal::Duration kScanPause = std::chrono::seconds(5);
+constexpr int kStopsWithoutScan = 2;  // and so many stops in a row: then no scanner is left.
+
+// The survey cannot go on; what() says why, in words for the operator.
+struct CannotGoOn : std::runtime_error {
+  using runtime_error::runtime_error;
+};
+
+// Trying again cannot help: the robot file asks for what the devices do not do.
+bool is_hopeless(boost::system::error_code error) {
+  return error == errc::invalid_argument || error == errc::argument_out_of_domain;
+}
 
 json::object pose_json(const hal::Pose2& pose) {
   return {{"x_m", pose.position_m.x()},
@@ -91,6 +106,9 @@ hal::Task<void> Survey::run() {
   try {
     // The survey decides when it is over; the pilot only keeps it company.
     co_await hal::first_of(survey(), pilot_.track());
+  } catch (const CannotGoOn& why) {
+    record_.end = why.what();
+    failure = std::current_exception();
   } catch (const boost::system::system_error& error) {
     record_.end =
         stop_reason_.empty() ? fmt::format("a device failed: {}", error.what()) : stop_reason_;
@@ -261,8 +279,8 @@ hal::Task<bool> Survey::visit(const Stop& stop) {
   }
   const bool there = scan.by_hand ? co_await carry(stop, scan) : co_await drive(stop, scan);
   if (!there) co_return false;
-  co_await acquire(stop, std::move(scan));
-  co_return true;
+  const bool scanned = co_await acquire(stop, std::move(scan));
+  co_return scanned;
 }
 
 hal::Task<bool> Survey::drive(const Stop& stop, ScanRecord& scan) {
@@ -282,6 +300,7 @@ hal::Task<bool> Survey::drive(const Stop& stop, ScanRecord& scan) {
           {"arrived", leg.arrived},
           {"driven_m", leg.driven_m},
           {"reason", leg.reason}});
+  if (leg.drive_lost) throw CannotGoOn(fmt::format("on the way to {}: {}", stop.name, leg.reason));
   if (!leg.arrived) drop(stop, leg.reason);
   co_return leg.arrived;
 }
@@ -300,10 +319,11 @@ hal::Task<bool> Survey::carry(const Stop& stop, ScanRecord& scan) {
   co_return true;
 }
 
-hal::Task<void> Survey::acquire(const Stop& stop, ScanRecord scan) {
+hal::Task<bool> Survey::acquire(const Stop& stop, ScanRecord scan) {
   scan.number = static_cast<int>(record_.scans.size()) + 1;
   scan.start_s = now_s();
-  const hal::ScanCloud cloud = (co_await parts_.devices.scanner.scan()).value();
+  const std::optional<hal::ScanCloud> cloud = co_await take_scan(stop);
+  if (!cloud) co_return false;
   scan.end_s = now_s();
   if (!scan.by_hand) {
     // The localizer has used the time: this pose is better than the one on arrival.
@@ -311,8 +331,33 @@ hal::Task<void> Survey::acquire(const Stop& stop, ScanRecord scan) {
     scan.covariance = pilot_.covariance();
     note_sigmas(scan);
   }
-  const std::function<void()> work = [&] { merge(cloud, stop, scan); };
+  const std::function<void()> work = [&] { merge(*cloud, stop, scan); };
   co_await parts_.compute.run(work);
+  co_return true;
+}
+
+// A few tries. Nothing: the stop is dropped, with the reason. Throws when it must be expected that
+// no stop will have a scan any more.
+hal::Task<std::optional<hal::ScanCloud>> Survey::take_scan(const Stop& stop) {
+  std::string reason;
+  bool hopeless = false;
+  for (int tries = 1; tries <= kScanTries && !hopeless; ++tries) {
+    auto cloud = co_await parts_.devices.scanner.scan();
+    if (cloud) {
+      stops_without_scan_ = 0;
+      co_return std::move(*cloud);
+    }
+    hopeless = is_hopeless(cloud.error());
+    const std::string troubles = parts_.devices.troubles ? parts_.devices.troubles() : "";
+    reason = fmt::format("no scan, tried {} times: {}{}", tries, cloud.error().message(),
+                         troubles.empty() ? "" : " (" + troubles + ")");
+    decide({{"t_s", now_s()}, {"decision", "no_scan"}, {"name", stop.name}, {"reason", reason}});
+    if (tries < kScanTries && !hopeless) co_await parts_.clock.sleep_for(kScanPause);
+  }
+  drop(stop, reason);
+  if (hopeless || ++stops_without_scan_ >= kStopsWithoutScan)
+    throw CannotGoOn(fmt::format("at {}: {}", stop.name, reason));
+  co_return std::nullopt;
 }
 
 void Survey::merge(const hal::ScanCloud& cloud, const Stop& stop, ScanRecord& scan) {

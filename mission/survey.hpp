@@ -34,8 +34,8 @@ class Survey {
   Survey(const MissionConfig& config, const nav::SiteMap& map, SiteTasks tasks, int threads,
          Parts parts);
 
-  // Device failures that a survey cannot work around throw boost::system::system_error; the record
-  // then says how far it came. Cancelled, it ends as soon as what it computes is computed.
+  // Device failures that a survey cannot work around throw std::runtime_error; the record then says
+  // how far it came, and why no farther. Cancelled, it ends as soon as what it computes is computed.
   hal::Task<void> run();
   // What the record gives as the end of a survey that is cancelled next.
   void stop_because(std::string reason) { stop_reason_ = std::move(reason); }
@@ -60,7 +60,8 @@ class Survey {
   hal::Task<bool> visit(const Stop& stop);
   hal::Task<bool> drive(const Stop& stop, ScanRecord& scan);
   hal::Task<bool> carry(const Stop& stop, ScanRecord& scan);
-  hal::Task<void> acquire(const Stop& stop, ScanRecord scan);
+  hal::Task<bool> acquire(const Stop& stop, ScanRecord scan);
+  hal::Task<std::optional<hal::ScanCloud>> take_scan(const Stop& stop);
   void merge(const hal::ScanCloud& cloud, const Stop& stop, ScanRecord& scan);
 
   std::vector<NextView> choose_views();
@@ -90,6 +91,7 @@ class Survey {
   std::size_t stations_planned_{};
   std::size_t stations_done_{};
   int views_taken_{};
+  int stops_without_scan_{};  // In a row.
   double covered_m_{};
   double target_m_{};
   CloudMerger cloud_;

@@ -137,9 +137,19 @@ void Cia402Node::reset_objects() {
               {key(cia402::kQuickStopDeceleration), {3000, 4}},
               {key(cia402::kVelocityTarget), {0, 4}},
               {key(cia402::kSupportedModes), {config_.modes, 4, false}}};
-  add_pdo(0x1400, 0x1600, 0x200U + config_.node);
-  add_pdo(0x1800, 0x1A00, 0x180U + config_.node);
-  add_pdo(0x1801, 0x1A01, 0x280U + config_.node);
+  for (std::uint16_t i = 0; i < kPdos; ++i) {
+    add_pdo(static_cast<std::uint16_t>(0x1400 + i), static_cast<std::uint16_t>(0x1600 + i),
+            0x200U + 0x100U * i + config_.node);
+    add_pdo(static_cast<std::uint16_t>(0x1800 + i), static_cast<std::uint16_t>(0x1A00 + i),
+            0x180U + 0x100U * i + config_.node);
+  }
+  for (const auto& pdo : config_.fixed_mapping) {
+    const auto map = static_cast<std::uint16_t>((pdo.from_node ? 0x1A00 : 0x1600) + pdo.number - 1);
+    objects_[key(map, 0)].value = static_cast<std::uint32_t>(pdo.mapping.size());
+    for (std::size_t i = 0; i < pdo.mapping.size(); ++i)
+      objects_[key(map, static_cast<std::uint8_t>(i + 1))].value =
+          drivers::canopen::mapping_word(pdo.mapping[i]);
+  }
   map_pdos();
 }
 
@@ -181,7 +191,7 @@ hal::Task<void> Cia402Node::hear(const hal::CanFrame& frame) {
       error_untold_ = true;
     }
   } else if (const auto* pdo = std::get_if<Pdo>(&message)) {
-    if (!pdo->from_node && pdo->node == config_.node && pdo->number == 1) rpdo_ = *pdo;
+    if (!pdo->from_node && pdo->node == config_.node) heard_[pdo->number - 1U] = *pdo;
   } else if (nmt_ != NodeState::stopped) {
     const auto reply = server_.step(frame);
     if (!reply) co_return;
@@ -217,9 +227,9 @@ hal::Task<void> Cia402Node::on_sync() {
   if (++syncs_ < std::lround(faults_.slowness())) co_return;
   syncs_ = 0;
   roll();
-  take_rpdo();
-  co_await send_tpdo(1, tpdo1_);
-  co_await send_tpdo(2, tpdo2_);
+  for (std::size_t i = 0; i < kPdos; ++i) take_rpdo(i);
+  for (std::size_t i = 0; i < kPdos; ++i)
+    co_await send_tpdo(static_cast<std::uint8_t>(i + 1), tpdos_[i]);
 }
 
 // --- Its objects.
@@ -277,7 +287,7 @@ std::uint32_t Cia402Node::refuses(Key at, const Object&, std::uint32_t value) co
   if (at == key(cia402::kModes) && (value == 0 || (config_.modes >> (value - 1) & 1) == 0))
     return kRange;
   if (!maps) return 0;
-  if (config_.fixed_mapping) return kReadOnly;
+  if (!config_.fixed_mapping.empty()) return kReadOnly;
   const auto map = static_cast<std::uint16_t>(at >> 8);
   const auto of = static_cast<std::uint16_t>(map - 0x200);
   if (object(of, 1) >> 31 == 0) return kState;  // Not while the PDO is on,
@@ -299,20 +309,20 @@ void Cia402Node::map_pdos() {
     }
     pdo.values.resize(pdo.mapping.size());
   };
-  take(rpdo1_, 0x1400, 0x1600);
-  take(tpdo1_, 0x1800, 0x1A00);
-  take(tpdo2_, 0x1801, 0x1A01);
+  for (std::uint16_t i = 0; i < kPdos; ++i) {
+    take(rpdos_[i], static_cast<std::uint16_t>(0x1400 + i), static_cast<std::uint16_t>(0x1600 + i));
+    take(tpdos_[i], static_cast<std::uint16_t>(0x1800 + i), static_cast<std::uint16_t>(0x1A00 + i));
+  }
 }
 
-void Cia402Node::take_rpdo() {
-  if (!rpdo_ || !rpdo1_.on) return;
-  const bool fits = unpack(rpdo1_.mapping, *rpdo_, rpdo1_.values);
-  rpdo_.reset();
-  if (!fits) return;
-  for (std::size_t i = 0; i < rpdo1_.mapping.size(); ++i) {
-    rpdo1_.objects[i]->value = static_cast<std::uint32_t>(rpdo1_.values[i]);
-    if (rpdo1_.mapping[i].at == cia402::kControlword)
-      obey(static_cast<std::uint16_t>(rpdo1_.values[i]));
+void Cia402Node::take_rpdo(std::size_t index) {
+  MappedPdo& rpdo = rpdos_[index];
+  const auto pdo = std::exchange(heard_[index], std::nullopt);
+  if (!pdo || !rpdo.on || !unpack(rpdo.mapping, *pdo, rpdo.values)) return;
+  for (std::size_t i = 0; i < rpdo.mapping.size(); ++i) {
+    rpdo.objects[i]->value = static_cast<std::uint32_t>(rpdo.values[i]);
+    if (rpdo.mapping[i].at == cia402::kControlword)
+      obey(static_cast<std::uint16_t>(rpdo.values[i]));
   }
   wheel_.told();
 }

@@ -2,6 +2,7 @@
 // PDOs on SYNC, heartbeats, emergencies, and the state machine.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -28,7 +29,8 @@ struct Cia402NodeConfig {
   std::string name = "simulated drive", software = "1.0";
   std::uint32_t device_type = 0x00020192;
   std::uint32_t modes = 0x00000185;  // PP, PV, CSP, CSV.
-  bool fixed_mapping = false;        // Refuses to be mapped, as some do.
+  // Mapped like this for ever, as some drives are; empty: as it is told.
+  std::vector<drivers::canopen::PdoSetup> fixed_mapping;
 };
 
 // One drive. Switched off (UnitFault::off) it forgets its settings, its state and its position.
@@ -79,7 +81,7 @@ class Cia402Node {
   std::uint32_t refuses(Key key, const Object& object, std::uint32_t value) const;
   std::uint32_t live_value(Key key, std::uint32_t stored) const;
   void map_pdos();
-  void take_rpdo();
+  void take_rpdo(std::size_t index);
   hal::Task<void> send_tpdo(std::uint8_t number, MappedPdo& pdo);
   void obey(std::uint16_t controlword);
   void enter(drivers::cia402::State state);
@@ -104,8 +106,9 @@ class Cia402Node {
   bool booted_ = false, hears_master_ = false;
   double position_ = 0;  // Counts.
   hal::Time master_at_{}, stalled_at_{}, stopping_at_{}, next_heartbeat_{};
-  std::optional<drivers::canopen::Pdo> rpdo_;
-  MappedPdo rpdo1_, tpdo1_, tpdo2_;
+  static constexpr std::size_t kPdos = 4;
+  std::array<std::optional<drivers::canopen::Pdo>, kPdos> heard_;
+  std::array<MappedPdo, kPdos> rpdos_, tpdos_;
   int syncs_ = 0;
 };
 

@@ -80,6 +80,7 @@ void OusterUnit::measure(hal::Time at) {
     }
   }
   packet_.frame_id = packet_.columns.front().frame_id;
+  if (config_.blind_in_motion && world_.moving()) return;
   cast_bundle(world_.scene(), config_.ranges, mix(config_.seed), rays_, ranges_m_);
   for (std::size_t i = 0; i < rays_.size(); ++i) {
     const double mm = ranges_m_[i] * 1000.0 * faults_.wrong_factor() + 0.5;

@@ -18,6 +18,9 @@ struct OusterUnitConfig {
   double skew = 20e-6;  // Of its crystal: seconds of its own per ours, less 1.
   ScannerModel ranges;  // Of it the ranges, their noise and the losses count.
   std::uint64_t seed = 1;
+  // While the robot moves, beams tell what they told before: nobody may use a scan taken in motion,
+  // and to cast all these beams would cost more than the rest of a mission.
+  bool blind_in_motion{};
 };
 
 // The metadata of an OS-1-32 at 1024 columns, as the sensor serves them.

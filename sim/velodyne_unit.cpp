@@ -68,6 +68,7 @@ void VelodyneUnit::measure(hal::Time at) {
                                                             std::sin(elevation));
     rays_[i].number = number_ + i;
   }
+  if (config_.blind_in_motion && world_.moving()) return;
   cast_bundle(world_.scene(), config_.ranges, mix(config_.seed), rays_, ranges_m_);
   for (std::size_t i = 0; i < rays_.size(); ++i) {
     const double steps = ranges_m_[i] * 500.0 * faults_.wrong_factor() + 0.5;

@@ -17,6 +17,9 @@ struct VelodyneUnitConfig {
   std::uint8_t product = 0x22;
   ScannerModel ranges;  // Of it the ranges, their noise and the losses count.
   std::uint64_t seed = 1;
+  // While the robot moves, beams tell what they told before: nobody may use a scan taken in motion,
+  // and to cast all these beams would cost more than the rest of a mission.
+  bool blind_in_motion{};
 };
 
 // Stands where World has the scanner, upright, and sends always: 754 packets a second. `wrong`

@@ -2,11 +2,11 @@
 
 #include <fcntl.h>
 #include <stdlib.h>
-#include <termios.h>
 #include <unistd.h>
 
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ip/udp.hpp>
 #include <boost/asio/posix/stream_descriptor.hpp>
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/use_awaitable.hpp>
@@ -14,7 +14,9 @@
 #include <optional>
 #include <system_error>
 
+#include "drivers/serial_port.hpp"
 #include "hal/wake.hpp"
+#include "sim/uart.hpp"
 
 namespace vantage {
 
@@ -87,18 +89,34 @@ hal::Task<hal::Result<std::size_t>> ServedTcp::read_some(std::span<std::uint8_t>
   }
 }
 
-struct ServedPty::State {
+struct ServedPty::State final : hal::ByteStream {
   asio::posix::stream_descriptor master;
   int slave = -1;  // Kept open, so that a client's leaving is no end.
+  sim::Uart uart;
 
-  explicit State(const asio::any_io_executor& executor) : master(executor) {}
-  ~State() {
+  State(const asio::any_io_executor& executor, int baud) : master(executor), uart(*this, baud) {}
+  ~State() override {
     if (slave >= 0) ::close(slave);
+  }
+
+  hal::Task<hal::Result<void>> write(std::span<const std::uint8_t> bytes) override {
+    boost::system::error_code error;
+    // All that fits at once: nobody may be reading at the other end.
+    master.write_some(asio::buffer(bytes.data(), bytes.size()), error);
+    co_return hal::Result<void>{};
+  }
+  hal::Task<hal::Result<std::size_t>> read_some(std::span<std::uint8_t> into) override {
+    boost::system::error_code error;
+    const std::size_t count = co_await master.async_read_some(
+        asio::buffer(into.data(), into.size()), asio::redirect_error(asio::use_awaitable, error));
+    uart.set_host_baud(static_cast<int>(drivers::speed_of(slave)));
+    if (error) co_return error;
+    co_return count;
   }
 };
 
-ServedPty::ServedPty(const asio::any_io_executor& executor, std::filesystem::path link)
-    : link_(std::move(link)), state_(std::make_unique<State>(executor)) {
+ServedPty::ServedPty(const asio::any_io_executor& executor, std::filesystem::path link, int baud)
+    : link_(std::move(link)), state_(std::make_unique<State>(executor, baud)) {
   const auto check = [](bool fine, const char* what) {
     if (!fine) throw std::system_error(errno, std::generic_category(), what);
   };
@@ -111,10 +129,9 @@ ServedPty::ServedPty(const asio::any_io_executor& executor, std::filesystem::pat
   check(::ptsname_r(master, name, sizeof name) == 0, "naming a pseudo terminal");
   state_->slave = ::open(name, O_RDWR | O_NOCTTY | O_CLOEXEC);
   check(state_->slave >= 0, "opening a pseudo terminal's far end");
-  termios raw{};
-  check(::tcgetattr(state_->slave, &raw) == 0, "setting a pseudo terminal");
-  ::cfmakeraw(&raw);
-  check(::tcsetattr(state_->slave, TCSANOW, &raw) == 0, "setting a pseudo terminal");
+  const drivers::SerialLine line{name, static_cast<std::uint32_t>(baud)};
+  if (const auto error = drivers::apply_settings(state_->slave, line))
+    throw std::system_error(error.value(), std::system_category(), "setting a pseudo terminal");
   std::filesystem::remove(link_);
   std::filesystem::create_symlink(name, link_);
 }
@@ -125,18 +142,39 @@ ServedPty::~ServedPty() {
 }
 
 hal::Task<hal::Result<void>> ServedPty::write(std::span<const std::uint8_t> bytes) {
-  boost::system::error_code error;
-  // All that fits at once: nobody may be reading at the other end.
-  state_->master.write_some(asio::buffer(bytes.data(), bytes.size()), error);
-  co_return hal::Result<void>{};
+  state_->uart.set_host_baud(static_cast<int>(drivers::speed_of(state_->slave)));
+  co_return co_await state_->uart.write(bytes);
 }
 
 hal::Task<hal::Result<std::size_t>> ServedPty::read_some(std::span<std::uint8_t> into) {
-  boost::system::error_code error;
-  const std::size_t count = co_await state_->master.async_read_some(
-      asio::buffer(into.data(), into.size()), asio::redirect_error(asio::use_awaitable, error));
-  if (error) co_return error;
-  co_return count;
+  co_return co_await state_->uart.read_some(into);
+}
+
+struct ServedUdp::State {
+  asio::ip::udp::socket socket;
+  asio::ip::udp::endpoint to;
+
+  explicit State(const asio::any_io_executor& executor) : socket(executor, asio::ip::udp::v4()) {
+    asio::ip::udp::socket finder(executor, {asio::ip::address_v4::loopback(), 0});
+    to = finder.local_endpoint();
+    socket.non_blocking(true);
+  }
+};
+
+ServedUdp::ServedUdp(const asio::any_io_executor& executor)
+    : state_(std::make_unique<State>(executor)) {}
+
+ServedUdp::~ServedUdp() = default;
+
+std::uint16_t ServedUdp::port() const {
+  return state_->to.port();
+}
+
+// What nobody takes is lost, as on a network.
+hal::Task<void> ServedUdp::send(std::span<const std::uint8_t> datagram) {
+  boost::system::error_code ignored;
+  state_->socket.send_to(asio::buffer(datagram.data(), datagram.size()), state_->to, 0, ignored);
+  co_return;
 }
 
 }  // namespace vantage

@@ -1,4 +1,5 @@
-// Links as a device has them: a TCP port that it listens on, the far end of a serial line.
+// Links as a device has them: a TCP port that it listens on, the far end of a serial line, a UDP
+// port that it sends to.
 #pragma once
 
 #include <boost/asio/any_io_executor.hpp>
@@ -8,6 +9,7 @@
 #include <string>
 
 #include "hal/links.hpp"
+#include "sim/links.hpp"
 
 namespace vantage {
 
@@ -29,13 +31,13 @@ class ServedTcp final : public hal::ByteStream {
   std::shared_ptr<State> state_;
 };
 
-// A pseudo terminal: whoever opens path() has the serial port of the device. Bytes take no time,
-// whatever rate is set.
+// A pseudo terminal: whoever opens path() has the serial port of the device. Bytes take no time; at
+// another rate than the device's both sides hear garbage.
 class ServedPty final : public hal::ByteStream {
  public:
   // `link` is made a symbolic link to the terminal, in place of what was there; it is removed at
   // the end. Throws std::system_error or std::filesystem::filesystem_error.
-  ServedPty(const boost::asio::any_io_executor& executor, std::filesystem::path link);
+  ServedPty(const boost::asio::any_io_executor& executor, std::filesystem::path link, int baud);
   ~ServedPty() override;
 
   const std::filesystem::path& path() const { return link_; }
@@ -47,6 +49,21 @@ class ServedPty final : public hal::ByteStream {
  private:
   struct State;
   std::filesystem::path link_;
+  std::unique_ptr<State> state_;
+};
+
+// Sends to a port of this machine that was free at the start.
+class ServedUdp final : public sim::DatagramSender {
+ public:
+  // Throws boost::system::system_error when there is none.
+  explicit ServedUdp(const boost::asio::any_io_executor& executor);
+  ~ServedUdp() override;
+
+  std::uint16_t port() const;
+  hal::Task<void> send(std::span<const std::uint8_t> datagram) override;
+
+ private:
+  struct State;
   std::unique_ptr<State> state_;
 };
 

@@ -19,6 +19,7 @@
 #include "drivers/socketcan.hpp"
 #include "hal/together.hpp"
 #include "mission/main_run.hpp"
+#include "mission/main_scanner.hpp"
 #include "mission/main_units.hpp"
 #include "sim/modbus_server.hpp"
 #include "tools/served_links.hpp"
@@ -39,17 +40,23 @@ struct Options {
 struct Served {
   std::unique_ptr<drivers::SocketCan> can, second_can;
   std::unique_ptr<vantage::ServedTcp> scanner, battery, safety;
-  std::unique_ptr<vantage::ServedPty> pan, imu, gnss, board;
+  std::unique_ptr<vantage::ServedPty> scanner_line, pan, imu, gnss, board;
+  std::unique_ptr<vantage::ServedUdp> packets;
   std::unique_ptr<vantage::ServedTcp> gpsd;
 };
+
+constexpr std::string_view kSerial = "serial:";
+// As the devices come from the factory.
+constexpr int kScannerBaud = 115200, kPanBaud = 9600, kImuBaud = 115200, kGnssBaud = 38400,
+              kBoardBaud = 9600;
 
 Served serve(const Options& options, const mission::RobotConfig& robot, asio::io_context& io,
              hal::Clock& clock) {
   const auto executor = io.get_executor();
   std::filesystem::create_directories(options.folder);
   Served served;
-  const auto pty = [&](const char* name) {
-    return std::make_unique<vantage::ServedPty>(executor, options.folder / name);
+  const auto pty = [&](const char* name, int baud) {
+    return std::make_unique<vantage::ServedPty>(executor, options.folder / name, baud);
   };
   const auto port = [&] { return std::make_unique<vantage::ServedTcp>(executor, 0); };
   if (!options.can.empty()) {
@@ -58,21 +65,32 @@ Served serve(const Options& options, const mission::RobotConfig& robot, asio::io
     if (robot.drive.device == "cia402")
       served.second_can = std::make_unique<drivers::SocketCan>(at, executor, clock);
   }
-  served.scanner = port();
-  served.pan = pty("pan");
-  served.imu = pty("imu");
+  if (!mission::needs_pan(robot.scanner))
+    served.packets = std::make_unique<vantage::ServedUdp>(executor);
+  else if (robot.scanner.link.starts_with(kSerial))
+    served.scanner_line = pty("scanner", kScannerBaud);
+  else
+    served.scanner = port();
+  if (mission::needs_pan(robot.scanner)) served.pan = pty("pan", kPanBaud);
+  served.imu = pty("imu", kImuBaud);
   if (robot.gnss.device == "gpsd")
     served.gpsd = port();
   else
-    served.gnss = pty("gnss");
+    served.gnss = pty("gnss", kGnssBaud);
   if (!robot.power.battery_link.empty()) served.battery = port();
-  if (!robot.power.board_link.empty()) served.board = pty("board");
+  if (!robot.power.board_link.empty()) served.board = pty("board", kBoardBaud);
   if (!robot.power.safety_link.empty()) served.safety = port();
   return served;
 }
 
-std::string serial(const vantage::ServedPty& pty, const char* line) {
-  return fmt::format("serial:{}@{}", pty.path().string(), line);
+std::string serial(const vantage::ServedPty& pty, int baud) {
+  return fmt::format("{}{}@{}", kSerial, pty.path().string(), baud);
+}
+
+std::string scanner_link(const Served& served) {
+  if (served.packets) return fmt::format("udp:{}", served.packets->port());
+  return served.scanner_line ? serial(*served.scanner_line, kScannerBaud)
+                             : fmt::format("tcp:127.0.0.1:{}", served.scanner->port());
 }
 
 // The robot file's tables with the links as they are served, to be pasted over the originals.
@@ -83,15 +101,16 @@ void print_links(const Options& options, const mission::RobotConfig& robot, cons
   if (served.can)
     fmt::print("[drive]\ndevice = \"{}\"\nlink = \"can:{}\"\n", robot.drive.device, options.can);
   fmt::print("[scanner]\ndevice = \"{}\"\nlink = \"{}\"\n", robot.scanner.device,
-             tcp(*served.scanner));
-  fmt::print("[pan]\nlink = \"{}\"\n[imu]\nlink = \"{}\"\n[gnss]\ndevice = \"{}\"\nlink = \"{}\"\n",
-             serial(*served.pan, "9600"), serial(*served.imu, "115200"), robot.gnss.device,
-             served.gpsd ? tcp(*served.gpsd) : serial(*served.gnss, "38400"));
+             scanner_link(served));
+  if (served.pan) fmt::print("[pan]\nlink = \"{}\"\n", serial(*served.pan, kPanBaud));
+  fmt::print("[imu]\nlink = \"{}\"\n[gnss]\ndevice = \"{}\"\nlink = \"{}\"\n",
+             serial(*served.imu, kImuBaud), robot.gnss.device,
+             served.gpsd ? tcp(*served.gpsd) : serial(*served.gnss, kGnssBaud));
   if (served.battery || served.board || served.safety) fmt::print("[power]\n");
   if (served.battery)
     fmt::print("battery_link = \"modbus-tcp:127.0.0.1:{}/225\"\n", served.battery->port());
   if (served.board)
-    fmt::print("board_link = \"modbus-rtu:{}@9600N/1\"\n", served.board->path().string());
+    fmt::print("board_link = \"modbus-rtu:{}@{}N/1\"\n", served.board->path().string(), kBoardBaud);
   if (served.safety)
     fmt::print("safety_link = \"modbus-tcp:127.0.0.1:{}/1\"\n", served.safety->port());
   std::fflush(stdout);
@@ -151,10 +170,12 @@ int run(const Options& options) {
       clock,
       {.drive = served.can.get(),
        .second_drive = served.second_can.get(),
-       .scanner = served.scanner.get(),
+       .scanner = served.scanner ? static_cast<hal::ByteStream*>(served.scanner.get())
+                                 : served.scanner_line.get(),
        .pan = served.pan.get(),
        .imu = served.imu.get(),
-       .gnss = served.gpsd ? static_cast<hal::ByteStream*>(served.gpsd.get()) : served.gnss.get()});
+       .gnss = served.gpsd ? static_cast<hal::ByteStream*>(served.gpsd.get()) : served.gnss.get(),
+       .packets = served.packets.get()});
   print_links(options, robot, served);
 
   std::vector<hal::Task<void>> tasks;

@@ -1,10 +1,12 @@
 // vantage check, vantage keys: is this mission right, and what may a mission say?
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 
 #include "mission/config_schema.hpp"
+#include "mission/main_robot.hpp"
 #include "tools/vantage_command.hpp"
 
 namespace vantage {
@@ -17,11 +19,22 @@ struct Options {
   bool json = false;
 };
 
+// What only the drivers can tell of a robot file that could be read.
+void check_robot(mission::MissionCheck& result) {
+  const std::string file = result.config.robot_file.generic_string();
+  const bool read = std::ranges::none_of(
+      result.errors, [&](const mission::ConfigError& error) { return error.file == file; });
+  if (!read) return;
+  const auto problems = mission::robot_problems(result.config);
+  result.errors.insert(result.errors.end(), problems.begin(), problems.end());
+}
+
 int check(const Options& options) {
-  const auto result = mission::check_mission(options.mission, {.site_folder = options.site,
-                                                               .robot_file = {},
-                                                               .has_seed = options.seed.has_value(),
-                                                               .seed = options.seed.value_or(0)});
+  auto result = mission::check_mission(options.mission, {.site_folder = options.site,
+                                                         .robot_file = {},
+                                                         .has_seed = options.seed.has_value(),
+                                                         .seed = options.seed.value_or(0)});
+  check_robot(result);
   if (options.json) print_json(mission::check_json(result));
   for (const auto& error : result.errors)
     if (!options.json) fmt::print(stderr, "{}\n", error.text());

@@ -187,7 +187,7 @@ TEST_F(Cia402Loop, StopsBothWhenOneFailsAndResetsTheFault) {
   wait(700ms);
   EXPECT_LT(world.rolling().forward_mps, 0.02);
   EXPECT_NEAR(world.robot().pose.heading_rad, heading_rad, 0.15) << "one side alone would spin it";
-  EXPECT_EQ(answers.back(), errc::not_connected);
+  EXPECT_EQ(answers.back(), errc::operation_not_permitted);
   twist = {};
   wait(3s);
   EXPECT_EQ(drive->state(), DeviceState::running) << troubles();
@@ -327,11 +327,43 @@ TEST_F(Cia402Loop, NamesADriveWithoutTheMode) {
       << troubles();
 }
 
-TEST_F(Cia402Loop, NamesADriveWithAFixedMapping) {
-  left_config.fixed_mapping = true;
+using drivers::canopen::Mapped;
+const Mapped kControl{drivers::cia402::kControlword, 16, false},
+    kStatus{drivers::cia402::kStatusword, 16, false}, kMode{drivers::cia402::kModes, 8, true},
+    kTarget{drivers::cia402::kVelocityTarget, 32, true},
+    kSpeed{drivers::cia402::kVelocityActual, 32, true},
+    kWhere{drivers::cia402::kPosition, 32, true};
+
+// The PDOs that CiA 402 proposes: speed in the fourth, position in the third.
+TEST_F(Cia402Loop, DrivesWithTheMappingThatADriveInsistsOn) {
+  right_config.fixed_mapping = {{1, false, 1, 0, {kControl}},
+                                {4, false, 1, 0, {kControl, kTarget, kMode}},
+                                {3, true, 1, 0, {kStatus, kWhere}},
+                                {4, true, 1, 0, {kSpeed, kStatus}}};
   make_both();
   wait(4s);
-  EXPECT_TRUE(says("object can only be read (left drive, node 1: mapping emptied, 0x06010002)"))
+  ASSERT_EQ(drive->state(), DeviceState::running) << troubles();
+  twist = {0.5, 0};
+  wait(6s);
+  twist = {0, -0.4};
+  wait(2s);
+  twist = {};
+  wait(2s);
+  EXPECT_GT(world.driven_m(), 2.5);
+  EXPECT_LT(world.robot().pose.heading_rad, -0.4);
+  EXPECT_NEAR(right_m - left_m, world.robot().pose.heading_rad * world.config().track_m, 0.005);
+  EXPECT_EQ(troubles(), "");
+}
+
+TEST_F(Cia402Loop, NamesWhatAFixedMappingLacks) {
+  left_config.fixed_mapping = {{1, false, 1, 0, {kControl}},
+                               {2, false, 1, 0, {kControl, kTarget, kWhere}},
+                               {1, true, 1, 0, {kStatus, kSpeed}}};
+  make_both();
+  wait(4s);
+  EXPECT_TRUE(
+      says("drive's fixed PDO mapping does not do (left drive, node 1: no RPDO with "
+           "controlword and target speed alone, no TPDO with the position)"))
       << troubles();
 }
 

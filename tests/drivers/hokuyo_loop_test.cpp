@@ -14,52 +14,15 @@ using sim::UnitFault;
 constexpr double kDeg = std::numbers::pi / 180;
 
 sim::HokuyoUnitConfig exact() {
-  sim::HokuyoUnitConfig unit;
-  unit.ranges.range_min_m = 0.1;
-  unit.ranges.range_max_m = 50;
-  unit.ranges.range_sigma_m = 0;
-  unit.ranges.lost_share_max = 0;
-  return unit;
+  return drivers_test::exact<sim::HokuyoUnitConfig>();
 }
 
-class HokuyoLoop : public drivers_test::LoopRig {
+class HokuyoLoop : public drivers_test::ProfileRig<Hokuyo, sim::HokuyoUnit> {
  protected:
-  void build(HokuyoConfig config = {}, sim::HokuyoUnitConfig unit_config = exact(),
+  void build(const HokuyoConfig& config = {}, const sim::HokuyoUnitConfig& unit_config = exact(),
              double bytes_per_s = 0) {
-    sim::StreamWire::Config line;
-    line.bytes_per_s = bytes_per_s;
-    wire.emplace(clock, line);
-    faults.emplace(clock, 5);
-    unit.emplace(unit_config, world, clock, wire->b(), *faults, pan);
-    device.emplace(config, clock, wire->a());
-    spawn(unit->run());
-    spawn(device->run());
+    connect(config, unit_config, bytes_per_s);
   }
-  ~HokuyoLoop() override { halt_all(); }
-
-  std::vector<hal::Profile> take(int count) {
-    std::vector<hal::Profile> profiles;
-    for (int i = 0; i < count; ++i) {
-      auto profile = result_of(device->next_profile());
-      if (!profile) {
-        ADD_FAILURE() << profile.error().message() << '\n' << told(*device);
-        break;
-      }
-      profiles.push_back(std::move(*profile));
-    }
-    return profiles;
-  }
-  bool start() { return result_of(device->start()).has_value(); }
-  void take_for(hal::Duration span) {
-    const hal::Time end = clock.now() + span;
-    while (clock.now() < end) (void)result_of(device->next_profile());
-  }
-
-  std::optional<sim::StreamWire> wire;
-  std::optional<sim::UnitFaults> faults;
-  sim::FixedPan pan;
-  std::optional<sim::HokuyoUnit> unit;
-  std::optional<Hokuyo> device;
 };
 
 TEST_F(HokuyoLoop, StartsIdentifiesAndMeasures) {

@@ -17,6 +17,7 @@
 #include "drivers/device.hpp"
 #include "hal/links.hpp"
 #include "sim/links.hpp"
+#include "sim/pan_truth.hpp"
 #include "sim/sim_clock.hpp"
 #include "sim/unit_faults.hpp"
 #include "sim/world.hpp"
@@ -130,5 +131,58 @@ class LoopRig : public testing::Test {
   sim::World world;
   std::vector<std::unique_ptr<boost::asio::cancellation_signal>> stops;
 };
+
+// A profile scanner's loop and its unit, on a pan axis that stands still.
+template <class Device, class Unit>
+class ProfileRig : public LoopRig {
+ protected:
+  template <class Config, class UnitConfig>
+  void connect(const Config& config, const UnitConfig& unit_config, double bytes_per_s = 0) {
+    sim::StreamWire::Config line;
+    line.bytes_per_s = bytes_per_s;
+    wire.emplace(clock, line);
+    faults.emplace(clock, 5);
+    unit.emplace(unit_config, world, clock, wire->b(), *faults, pan);
+    device.emplace(config, clock, wire->a());
+    spawn(unit->run());
+    spawn(device->run());
+  }
+  ~ProfileRig() override { halt_all(); }
+
+  std::vector<hal::Profile> take(int count) {
+    std::vector<hal::Profile> profiles;
+    for (int i = 0; i < count; ++i) {
+      auto profile = result_of(device->next_profile());
+      if (!profile) {
+        ADD_FAILURE() << profile.error().message() << '\n' << told(*device);
+        break;
+      }
+      profiles.push_back(std::move(*profile));
+    }
+    return profiles;
+  }
+  bool start() { return result_of(device->start()).has_value(); }
+  // Takes profiles as they come, for so long.
+  void take_for(hal::Duration span) {
+    const hal::Time end = clock.now() + span;
+    while (clock.now() < end) (void)result_of(device->next_profile());
+  }
+
+  std::optional<sim::StreamWire> wire;
+  std::optional<sim::UnitFaults> faults;
+  sim::FixedPan pan;
+  std::optional<Unit> unit;
+  std::optional<Device> device;
+};
+
+// What a unit measures without noise or losses.
+template <class UnitConfig>
+UnitConfig exact(UnitConfig unit = {}) {
+  unit.ranges.range_min_m = 0.1;
+  unit.ranges.range_max_m = 50;
+  unit.ranges.range_sigma_m = 0;
+  unit.ranges.lost_share_max = 0;
+  return unit;
+}
 
 }  // namespace drivers_test

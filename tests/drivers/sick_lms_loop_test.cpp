@@ -26,52 +26,17 @@ SickLmsConfig lms511() {
   return config;
 }
 sim::SickLmsUnitConfig unit_of(const SickLmsConfig& config) {
-  sim::SickLmsUnitConfig unit;
+  auto unit = drivers_test::exact<sim::SickLmsUnitConfig>();
   unit.lms5xx = config.settings.lms5xx;
-  unit.ranges.range_min_m = 0.1;
-  unit.ranges.range_max_m = 50;
-  unit.ranges.range_sigma_m = 0;
-  unit.ranges.lost_share_max = 0;
   return unit;
 }
 
-class SickLmsLoop : public drivers_test::LoopRig {
+class SickLmsLoop : public drivers_test::ProfileRig<SickLms, sim::SickLmsUnit> {
  protected:
-  void build(const SickLmsConfig& config, sim::SickLmsUnitConfig unit_config) {
-    wire.emplace(clock);
-    faults.emplace(clock, 5);
-    unit.emplace(unit_config, world, clock, wire->b(), *faults, pan);
-    device.emplace(config, clock, wire->a());
-    spawn(unit->run());
-    spawn(device->run());
+  void build(const SickLmsConfig& config, const sim::SickLmsUnitConfig& unit_config) {
+    connect(config, unit_config);
   }
   void build(const SickLmsConfig& config = lms111()) { build(config, unit_of(config)); }
-  ~SickLmsLoop() override { halt_all(); }
-
-  std::vector<hal::Profile> take(int count) {
-    std::vector<hal::Profile> profiles;
-    for (int i = 0; i < count; ++i) {
-      auto profile = result_of(device->next_profile());
-      if (!profile) {
-        ADD_FAILURE() << profile.error().message() << '\n' << told(*device);
-        break;
-      }
-      profiles.push_back(std::move(*profile));
-    }
-    return profiles;
-  }
-  bool start() { return result_of(device->start()).has_value(); }
-  // Takes profiles as they come, for so long.
-  void take_for(hal::Duration span) {
-    const hal::Time end = clock.now() + span;
-    while (clock.now() < end) (void)result_of(device->next_profile());
-  }
-
-  std::optional<sim::StreamWire> wire;
-  std::optional<sim::UnitFaults> faults;
-  sim::FixedPan pan;
-  std::optional<sim::SickLmsUnit> unit;
-  std::optional<SickLms> device;
 };
 
 TEST_F(SickLmsLoop, StartsIdentifiesAndMeasures) {

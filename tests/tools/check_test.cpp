@@ -59,6 +59,16 @@ TEST_F(Vantage, CheckReportsErrorsOfMissionRobotAndSiteInOneRunOnStderr) {
   EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 3);
 }
 
+TEST_F(Vantage, CheckNamesARobotThatItsDevicesCannotBe) {
+  write_site("yard");
+  write("fast.toml", "[scanner]\nazimuth_step_deg = 1.0\nelevation_step_deg = 0.5\n");
+  const auto mission = write("m.toml", "robot = 'fast.toml'\nsite = 'yard'\n");
+  const auto outcome = run("check " + mission.string());
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("fast.toml: this field of view needs the pan unit to turn"));
+  EXPECT_THAT(outcome.err, HasSubstr("turn more slowly by a smaller azimuth_step_deg"));
+}
+
 TEST_F(Vantage, CheckAsJsonHoldsErrorsRepairsValuesAndAreas) {
   write_site("yard");
   const auto mission = write("m.toml", "site = 'yard'\nseed = 9\n");

@@ -1,9 +1,11 @@
 // `vantage doctor` and `vantage-units` talk over pseudo terminals and TCP: two programs of ours,
 // and between them only what a real robot has, too.
 #include <signal.h>
+#include <unistd.h>
 
 #include <boost/json/array.hpp>
 #include <boost/json/object.hpp>
+#include <boost/json/serialize.hpp>
 #include <chrono>
 #include <map>
 #include <thread>
@@ -16,9 +18,13 @@ using namespace std::chrono_literals;
 
 const std::string kSource = VANTAGE_SOURCE_DIR;
 
+std::string shipped(const std::string& robot) {
+  return test::read_text(kSource + "/configs/robots/" + robot);
+}
+
 // The robot file with every device that it may have.
 std::string full_robot() {
-  std::string robot = test::read_text(kSource + "/configs/robots/scout_lms511.toml");
+  std::string robot = shipped("scout_lms511.toml");
   for (const char* line : {"[power]", "battery_link", "board_link", "safety_link"}) {
     const auto at = robot.find(std::string("# ") + line);
     EXPECT_NE(at, std::string::npos) << line;
@@ -30,8 +36,8 @@ std::string full_robot() {
 class DoctorTest : public test::VantageTest {
  protected:
   // Starts the units with what a person types; robot_ then has their links.
-  void start_units(const std::string& typed) {
-    const auto original = write("original.toml", full_robot());
+  void start_units(const std::string& typed, const std::string& robot = full_robot()) {
+    const auto original = write("original.toml", robot);
     const auto folder = folder_.path().string();
     const std::string command = "{ printf '" + typed + "\\n'; sleep 60; } | " + VANTAGE_BINARY_DIR +
                                 "/vantage-units " + kSource +
@@ -39,9 +45,9 @@ class DoctorTest : public test::VantageTest {
                                 " --folder " + folder + "/ports >" + folder + "/links 2>" + folder +
                                 "/units_err & echo $! >" + folder + "/pid";
     ASSERT_EQ(std::system(command.c_str()), 0);
-    for (int i = 0; i < 300 && links().find("safety_link") == std::string::npos; ++i)
+    for (int i = 0; i < 300 && links().find("[gnss]") == std::string::npos; ++i)
       std::this_thread::sleep_for(100ms);
-    robot_ = write("robot.toml", with_links(full_robot()));
+    robot_ = write("robot.toml", with_links(robot));
   }
   void TearDown() override {
     const int pid = std::atoi(test::read_text(folder_.path() / "pid").c_str());
@@ -102,6 +108,139 @@ TEST_F(DoctorTest, FindsAndIdentifiesWhatIsThereAndSaysWhatIsNot) {
   EXPECT_FALSE(devices["drive"].at("healthy").as_bool());
   EXPECT_NE(names(devices["drive"]).find("not there"), std::string::npos)
       << names(devices["drive"]);
+}
+
+class ShippedRobots : public DoctorTest, public testing::WithParamInterface<const char*> {};
+
+// Their scanners on TCP, a serial line and UDP; all kinds of satellite receivers.
+TEST_P(ShippedRobots, AreHealthyButForTheMissingCan) {
+  std::string robot = shipped(GetParam());
+  if (GetParam() == std::string("scout_ouster.toml")) write("os1_32.json", shipped("os1_32.json"));
+  start_units("pan none", robot);
+  auto devices = diagnose("15");
+  ASSERT_GE(devices.size(), 4U);
+  for (const auto& [role, device] : devices) {
+    // On a busy machine packets come late, and the doctor says so: that is no fault of the robot.
+    const bool late = names(device) == "scans come late; ";
+    EXPECT_EQ(device.at("healthy").as_bool() || late, role != "drive") << role << names(device);
+    EXPECT_EQ(device.at("state").as_string() == "running", role != "drive") << role;
+    if (role == "scanner" || role == "imu")
+      EXPECT_FALSE(device.at("maker").as_string().empty()) << role;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ShippedRobots,
+                         testing::Values("avenue.toml", "bunker_vlp16.toml", "scout_ouster.toml",
+                                         "scout_hokuyo.toml", "mini_lms111.toml"),
+                         [](const auto& param) {
+                           const std::string name = param.param;
+                           return name.substr(0, name.find('.'));
+                         });
+
+TEST_F(DoctorTest, FindsAHokuyoOnASerialLine) {
+  std::string robot = shipped("scout_hokuyo.toml");
+  const auto at = robot.find("tcp:192.168.0.10:10940");
+  robot.replace(at, std::string("tcp:192.168.0.10:10940").size(), "serial:/dev/ttyACM1@115200");
+  start_units("pan none", robot);
+  auto devices = diagnose("12");
+  EXPECT_TRUE(devices["scanner"].at("healthy").as_bool()) << names(devices["scanner"]);
+  EXPECT_NE(devices["scanner"].at("link").as_string().find("serial:"), std::string::npos);
+}
+
+// A robot whose wiring or settings are wrong in one place: what is written instead of the right
+// text, and what the doctor then says and advises.
+struct Wrong {
+  const char* name;
+  const char* role;
+  const char* table;
+  const char* key;
+  const char* instead;  // "@RATE": the same line at that rate; "swap TABLE": that device's link.
+  const char* says;
+  const char* advises;
+};
+
+void PrintTo(const Wrong& wrong, std::ostream* to) {
+  *to << wrong.name;
+}
+
+class WrongWiring : public DoctorTest, public testing::WithParamInterface<Wrong> {
+ protected:
+  static std::string link_in(const std::string& robot, const std::string& table) {
+    const auto key = robot.find("\nlink = \"", robot.find("[" + table + "]")) + 9;
+    return robot.substr(key, robot.find('"', key) - key);
+  }
+  static void put(std::string& robot, const std::string& table, const std::string& key,
+                  const std::string& text) {
+    const auto at = robot.find("\n" + key + " = \"", robot.find("[" + table + "]")) + 1;
+    robot.replace(at, robot.find('\n', at) - at, key + " = \"" + text + "\"");
+  }
+  static std::string with(std::string robot, const Wrong& wrong) {
+    const std::string instead = wrong.instead, own = link_in(robot, wrong.table);
+    if (instead.starts_with("swap ")) {
+      const std::string other = instead.substr(5);
+      put(robot, wrong.table, wrong.key, link_in(robot, other));
+      put(robot, other, wrong.key, own);
+    } else if (instead.starts_with("@")) {  // Another rate on the same line.
+      put(robot, wrong.table, wrong.key, own.substr(0, own.find('@')) + instead);
+    } else {
+      put(robot, wrong.table, wrong.key, instead);
+    }
+    return robot;
+  }
+};
+
+TEST_P(WrongWiring, IsNamedWithItsRemedy) {
+  const Wrong& wrong = GetParam();
+  start_units("pan none");
+  robot_ = write("wrong.toml", with(test::read_text(robot_), wrong));
+  auto devices = diagnose("9");
+  const boost::json::object& device = devices[wrong.role];
+  EXPECT_FALSE(device.at("healthy").as_bool());
+  bool found = false;
+  for (const auto& trouble : device.at("troubles").as_array())
+    found = found || (trouble.at("name").as_string() == wrong.says &&
+                      trouble.at("remedy").as_string().find(wrong.advises) != std::string::npos);
+  EXPECT_TRUE(found) << names(device);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Doctor, WrongWiring,
+    testing::Values(Wrong{"BaudOfThePanUnit", "pan", "pan", "link", "@19200",
+                          "no pan-tilt unit's answers", "set the serial line to 9600 baud"},
+                    Wrong{"BaudOfTheImu", "imu", "imu", "link", "@57600", "not understood",
+                          "set the bit rate of the robot file"},
+                    Wrong{"BaudOfTheReceiver", "gnss", "gnss", "link", "@4800", "not understood",
+                          "set the bit rate of the robot file"},
+                    Wrong{"PortOfTheScanner", "scanner", "scanner", "link", "tcp:127.0.0.1:1",
+                          "connection refused", "check the port"},
+                    Wrong{"AddressOfTheScanner", "scanner", "scanner", "link",
+                          "tcp:no-such-host.invalid:2112", "unknown host name",
+                          "write the IP address"},
+                    Wrong{"NoSuchSerialPort", "imu", "imu", "link",
+                          "serial:/dev/no-such-port@115200", "not there", "plug it in"},
+                    Wrong{"ImuAndReceiverSwapped", "imu", "imu", "link", "swap gnss",
+                          "another device", "correct the port"},
+                    Wrong{"ReceiverWhereGpsdIsNamed", "gnss", "gnss", "device", "gpsd",
+                          "another device", "the model in the robot file"}),
+    [](const auto& param) { return std::string(param.param.name); });
+
+// As a user who is not in the port's group.
+TEST_F(DoctorTest, NamesTheGroupThatMayOpenAPort) {
+  if (geteuid() != 0) GTEST_SKIP() << "only root can become a user without rights";
+  start_units("pan none");
+  std::filesystem::permissions(
+      folder_.path(), std::filesystem::perms::others_read | std::filesystem::perms::others_exec,
+      std::filesystem::perm_options::add);
+  const test::Outcome outcome =
+      test::run_program("vantage", "doctor " + robot_.string() + " --json --wait 2", folder_.path(),
+                        "setpriv --reuid=65534 --regid=65534 --clear-groups ");
+  const boost::json::value report = outcome.json();
+  for (const auto& device : report.at("devices").as_array())
+    if (device.at("role").as_string() == "imu") {
+      EXPECT_NE(names(device.as_object()).find("not permitted"), std::string::npos);
+      EXPECT_NE(serialize(device).find("usermod -aG GROUP USER"), std::string::npos);
+      EXPECT_NE(serialize(device).find("; group "), std::string::npos);
+    }
 }
 
 TEST_F(DoctorTest, TellsASilentDeviceFromHealthyOnes) {

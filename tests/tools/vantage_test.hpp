@@ -31,12 +31,12 @@ inline std::string read_text(const std::filesystem::path& file) {
   return std::move(text).str();
 }
 
-// build/PROGRAM ARGUMENTS, run by a shell; stderr goes through a file in `folder`.
+// PREFIX build/PROGRAM ARGUMENTS, run by a shell; stderr goes through a file in `folder`.
 inline Outcome run_program(const std::string& program, const std::string& arguments,
-                           const std::filesystem::path& folder) {
+                           const std::filesystem::path& folder, const std::string& prefix = "") {
   const auto err = folder / "stderr";
-  const std::string command =
-      std::string(VANTAGE_BINARY_DIR) + "/" + program + " " + arguments + " 2>" + err.string();
+  const std::string command = prefix + std::string(VANTAGE_BINARY_DIR) + "/" + program + " " +
+                              arguments + " 2>" + err.string();
   FILE* pipe = popen(command.c_str(), "r");
   Outcome outcome;
   if (pipe == nullptr) return outcome;

@@ -1,0 +1,70 @@
+// A site of one small house in a yard, and a robot with few beams: a whole mission through drivers
+// and units in about a second.
+#pragma once
+
+#include <fstream>
+#include <string>
+
+#include "mission/main_run.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace mission_test {
+
+// Stands in for the shipped robot file where a test does not care.
+inline const std::string kQuickRobot =
+    "[scanner]\nazimuth_step_deg = 1.0\nelevation_step_deg = 0.5\nrange_max_m = 40\n"
+    "[pan]\nangle_max_deg = 360\n";
+
+class SmallSite {
+ public:
+  explicit SmallSite(const std::string& robot = kQuickRobot, int views_max = 0) {
+    write("footprint.geojson",
+          R"({"type":"Polygon","coordinates":[[[0,0],[6,0],[6,6],[0,6],[0,0]]]})");
+    write("model.obj",
+          "v -40 -40 0\nv 40 -40 0\nv 40 40 0\nv -40 40 0\n"
+          "v 0 0 0\nv 6 0 0\nv 6 6 0\nv 0 6 0\nv 0 0 5\nv 6 0 5\nv 6 6 5\nv 0 6 5\n"
+          "f 1 2 3\nf 1 3 4\nf 5 6 10\nf 5 10 9\nf 6 7 11\nf 6 11 10\nf 7 8 12\nf 7 12 11\n"
+          "f 8 5 9\nf 8 9 12\nf 9 10 11\nf 9 11 12\n");
+    write("robot.toml", robot);
+    write("mission.toml",
+          "robot = \"robot.toml\"\nsite = \".\"\nmargin_m = 10.0\n[phase1]\ncandidates = 100\n"
+          "[phase2]\nheight_m = 10.0\nheight_max_m = 10.0\ngain_min_voxels = 10\n"
+          "views_max = " +
+              std::to_string(views_max) + "\n");
+  }
+
+  // A robot file in place of the site's own; empty: that.
+  std::filesystem::path robot_file;
+
+  mission::Prepared prepared() const {
+    return mission::prepare(
+        folder_.path() / "mission.toml",
+        {.site_folder = {}, .robot_file = robot_file, .has_seed = false, .seed = 0},
+        mission::WorldUse::world);
+  }
+  // Runs the mission; `watch` may break something as time goes on.
+  mission::RunOutcome run(const std::function<void(mission::SimBackend&)>& watch = {}) const {
+    mission::Prepared ready = prepared();
+    for (const auto& error : ready.errors) ADD_FAILURE() << error.text();
+    return mission::run_in_simulation(ready, {.out = out(),
+                                              .judge_cells = {},
+                                              .threads = 1,
+                                              .progress = nullptr,
+                                              .terminal = false,
+                                              .watch = watch});
+  }
+  std::filesystem::path out() const { return folder_.path() / "run"; }
+  std::filesystem::path folder() const { return folder_.path(); }
+  std::string summary() const {
+    std::ifstream file(out() / "summary.json");
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+ private:
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_.path() / name) << text;
+  }
+  test::TempFolder folder_;
+};
+
+}  // namespace mission_test
