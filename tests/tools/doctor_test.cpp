@@ -124,8 +124,9 @@ TEST_P(ShippedRobots, AreHealthyButForTheMissingCan) {
     const bool late = names(device) == "scans come late; ";
     EXPECT_EQ(device.at("healthy").as_bool() || late, role != "drive") << role << names(device);
     EXPECT_EQ(device.at("state").as_string() == "running", role != "drive") << role;
-    if (role == "scanner" || role == "imu")
+    if (role == "scanner" || role == "imu") {
       EXPECT_FALSE(device.at("maker").as_string().empty()) << role;
+    }
   }
 }
 
