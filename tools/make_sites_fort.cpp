@@ -317,9 +317,9 @@ barracks and rampart, a dry moat, a glacis. 300 x 300 m in all, nothing above 22
   which the scanner looks over, closes the passage under the west barracks.
 - Ramparts in steps that the map does not show: walkway at 3 m, firing step at 4 m, parapet at 5.2
   m, scarp leaning back 1 in 8; the counterscarp stands up to 1 m, and the glacis falls to 0 m.
-- `gun_sheds` (three wings, 8 m high, round a yard of 22 x 11 m in the moat before the east curtain)
-  stand in the model and not in the map. They hide the scarp behind them, and their yard, which
-  opens towards the scarp, is hidden from nearly everywhere.
+- `gun_sheds` (three wings, 8 m high, round a yard of 22 x 11 m in the moat before the east curtain,
+  built against the counterscarp) stand in the model and not in the map. They hide the walls on
+  both sides, and their yard, which opens towards the scarp, is hidden from nearly everywhere.
 - Porch roofs, eaves, the passage under the west barracks and the bridge hang over free ground.
 - Faults of drawn maps: the ring of `barracks south` is left open; `barracks east` repeats a
   vertex; the southern half of `barracks west` runs clockwise; the link walls reach 5 cm into the

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "run_mission.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace {
 
@@ -196,10 +197,12 @@ double seen_at_threshold(const std::string& site, int voxels) {
   const std::string threshold = "gain_min_voxels = " + std::to_string(voxels);
   text.replace(key, text.find('\n', key) - key, threshold + "\nviews_max = 1000");
   const std::string name = site + "-" + std::to_string(voxels);
-  const auto file = missions::configs() / "missions" / ("." + name + ".toml");
+  for (std::size_t at; (at = text.find("\"../")) != std::string::npos;)
+    text.replace(at, 4, "\"" + missions::configs().string() + "/");
+  const test::TempFolder folder;
+  const auto file = folder.path() / (name + ".toml");
   std::ofstream(file) << text;
   const MissionRun run = missions::run(file, name, {"--quiet"});
-  std::filesystem::remove(file);
   EXPECT_EQ(run.exit_code, 0) << run.output;
   std::filesystem::remove_all(run.folder);
   return run.exit_code == 0 ? number(run.object("truth").at("seen_of_visible")) : 0;

@@ -141,11 +141,18 @@ std::vector<EdgeSample> edge_samples(const Footprint& map) {
   return samples;
 }
 
+// On the fort: within the building that the map lacks, or its yard.
+bool in_gun_sheds(const Vector3d& p) {
+  return p.x() > 68.7 && p.x() < 86.3 && std::abs(p.y()) < 17.5;
+}
+
 TEST_P(EverySite, HasItsWallsWhereTheMapDrawsThem) {
   const Columns columns(site_.model);
+  const bool fort = std::string(GetParam().name) == "fort";
   const auto samples = edge_samples(site_.map);
   EXPECT_GT(samples.size(), 150u);
   for (const EdgeSample& s : samples) {
+    if (fort && in_gun_sheds({s.out.x(), s.out.y(), 0})) continue;  // Built against the wall.
     const auto winding = [&](const Vector2d& p, double above_m) {
       return columns.above({p.x(), p.y(), s.ground_z_m + above_m}).winding;
     };
@@ -173,11 +180,6 @@ std::vector<Vector3d> free_points(const Footprint& map, int tries) {
     }
   }
   return points;
-}
-
-// On the fort: within the building that the map lacks, or its yard.
-bool in_gun_sheds(const Vector3d& p) {
-  return p.x() > 68.7 && p.x() < 86.3 && std::abs(p.y()) < 17.5;
 }
 
 TEST_P(EverySite, IsOpenWhereTheMapSaysFreeButForTheMissingBuilding) {
