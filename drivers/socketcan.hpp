@@ -25,8 +25,8 @@ struct CanFilter {
 // frame given to the controller cannot be recalled: when send() fails with errc::timed_out because
 // nobody acknowledged in time, that one frame may still go when somebody does; later ones that
 // timed out never go. Where the interface's driver does not say when (`ip link` shows no ECHO), a
-// frame counts as confirmed once the kernel has it. Up to kReceivedMax received frames wait; then the newest is lost, and
-// counted.
+// frame counts as confirmed once the kernel has it. Up to kReceivedMax received frames wait; then
+// the newest is lost, and counted.
 class SocketCan final : public hal::CanBus, public Link {
  public:
   static constexpr std::size_t kReceivedMax = 1024;

@@ -35,7 +35,8 @@ class Survey {
          Parts parts);
 
   // Device failures that a survey cannot work around throw std::runtime_error; the record then says
-  // how far it came, and why no farther. Cancelled, it ends as soon as what it computes is computed.
+  // how far it came, and why no farther. Cancelled, it ends as soon as what it computes is
+  // computed.
   hal::Task<void> run();
   // What the record gives as the end of a survey that is cancelled next.
   void stop_because(std::string reason) { stop_reason_ = std::move(reason); }
