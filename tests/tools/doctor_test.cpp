@@ -39,8 +39,9 @@ class DoctorTest : public test::VantageTest {
   void start_units(const std::string& typed, const std::string& robot = full_robot()) {
     const auto original = write("original.toml", robot);
     const auto folder = folder_.path().string();
-    const std::string command = "{ printf '" + typed + "\\n'; sleep 60; } | " + VANTAGE_BINARY_DIR +
-                                "/vantage-units " + kSource +
+    // Nothing that stays behind may hold what the test prints to: whoever reads it would wait.
+    const std::string command = "{ printf '" + typed + "\\n'; sleep 60; } 2>/dev/null | " +
+                                VANTAGE_BINARY_DIR + "/vantage-units " + kSource +
                                 "/configs/missions/courtyard.toml --robot " + original.string() +
                                 " --folder " + folder + "/ports >" + folder + "/links 2>" + folder +
                                 "/units_err & echo $! >" + folder + "/pid";
@@ -194,14 +195,20 @@ TEST_P(WrongWiring, IsNamedWithItsRemedy) {
   const Wrong& wrong = GetParam();
   start_units("pan none");
   robot_ = write("wrong.toml", with(test::read_text(robot_), wrong));
-  auto devices = diagnose("9");
-  const boost::json::object& device = devices[wrong.role];
-  EXPECT_FALSE(device.at("healthy").as_bool());
+  // A driver that finds nothing where it looks first says so, and then looks on: the doctor shows
+  // where it is at the end of the wait.
   bool found = false;
-  for (const auto& trouble : device.at("troubles").as_array())
-    found = found || (trouble.at("name").as_string() == wrong.says &&
-                      trouble.at("remedy").as_string().find(wrong.advises) != std::string::npos);
-  EXPECT_TRUE(found) << names(device);
+  std::string said;
+  for (int tries = 0; tries < 3 && !found; ++tries) {
+    auto devices = diagnose("9");
+    const boost::json::object& device = devices[wrong.role];
+    EXPECT_FALSE(device.at("healthy").as_bool());
+    said += names(device);
+    for (const auto& trouble : device.at("troubles").as_array())
+      found = found || (trouble.at("name").as_string() == wrong.says &&
+                        trouble.at("remedy").as_string().find(wrong.advises) != std::string::npos);
+  }
+  EXPECT_TRUE(found) << said;
 }
 
 INSTANTIATE_TEST_SUITE_P(
