@@ -40,11 +40,11 @@ class DoctorTest : public test::VantageTest {
     const auto original = write("original.toml", robot);
     const auto folder = folder_.path().string();
     // Nothing that stays behind may hold what the test prints to: whoever reads it would wait.
-    const std::string command = "{ printf '" + typed + "\\n'; sleep 60; } 2>/dev/null | " +
-                                VANTAGE_BINARY_DIR + "/vantage-units " + kSource +
-                                "/configs/missions/courtyard.toml --robot " + original.string() +
-                                " --folder " + folder + "/ports >" + folder + "/links 2>" + folder +
-                                "/units_err & echo $! >" + folder + "/pid";
+    const std::string command =
+        "( exec 2>/dev/null; printf '" + typed + "\\n'; exec sleep 60 ) | " + VANTAGE_BINARY_DIR +
+        "/vantage-units " + kSource + "/configs/missions/courtyard.toml --robot " +
+        original.string() + " --folder " + folder + "/ports >" + folder + "/links 2>" + folder +
+        "/units_err & echo $! >" + folder + "/pid";
     ASSERT_EQ(std::system(command.c_str()), 0);
     for (int i = 0; i < 300 && links().find("[gnss]") == std::string::npos; ++i)
       std::this_thread::sleep_for(100ms);
