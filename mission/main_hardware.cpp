@@ -5,6 +5,7 @@
 #include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <csignal>
 #include <ostream>
 
@@ -20,6 +21,7 @@ namespace asio = boost::asio;
 constexpr hal::Duration kSayWaiting = std::chrono::seconds(5);
 constexpr hal::Duration kSettle = std::chrono::seconds(1);
 constexpr hal::Duration kRelease = std::chrono::seconds(3);  // For a drive that may be gone.
+constexpr hal::Duration kMeantOnce = std::chrono::seconds(1);
 
 std::string text_of(std::exception_ptr error) {
   try {
@@ -51,18 +53,25 @@ void note_run(RunRecord& record, const Prepared& prepared, const DeviceWatch& wa
 }
 
 // Tells whoever looks at the program, and stops it when told to by a signal.
+// One that comes twice at once is meant once: `timeout`, a shell or a service manager signals both
+// the program and its group.
 class Signals {
  public:
-  Signals(asio::io_context& io, GuardedSurvey& survey) : set_(io, SIGINT, SIGTERM) {
+  Signals(asio::io_context& io, GuardedSurvey& survey)
+      : set_(io, SIGINT, SIGTERM), meant_once_(io) {
     set_.async_wait([this, &survey](boost::system::error_code error, int number) {
       if (error) return;
-      set_.clear();  // The next one ends the program.
       survey.stop(fmt::format("stopped by {}", number == SIGINT ? "SIGINT" : "SIGTERM"));
+      meant_once_.expires_after(kMeantOnce);
+      meant_once_.async_wait([this](boost::system::error_code over) {
+        if (!over) set_.clear();  // The next one ends the program.
+      });
     });
   }
 
  private:
   asio::signal_set set_;
+  asio::steady_timer meant_once_;
 };
 
 }  // namespace

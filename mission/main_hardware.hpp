@@ -67,9 +67,9 @@ class GuardedSurvey {
 };
 
 // Runs the whole mission on the devices that the robot file's links lead to, and writes its
-// products. SIGINT and SIGTERM stop it; a second one ends the program at once (the drive then
-// stands by its own time-out). Throws boost::system::system_error when the folder cannot be
-// written.
+// products. SIGINT and SIGTERM stop it; one more than a second later ends the program at once (the
+// drive then stands by its own time-out). Throws boost::system::system_error when the folder cannot
+// be written.
 RunOutcome run_on_hardware(Prepared& prepared, const RunOptions& options);
 
 }  // namespace mission

@@ -12,7 +12,7 @@
 namespace vantage {
 namespace {
 
-struct Options {
+struct CheckOptions {
   std::filesystem::path mission;
   std::filesystem::path site;
   std::optional<std::uint64_t> seed;
@@ -29,7 +29,7 @@ void check_robot(mission::MissionCheck& result) {
   result.errors.insert(result.errors.end(), problems.begin(), problems.end());
 }
 
-int check(const Options& options) {
+int check(const CheckOptions& options) {
   auto result = mission::check_mission(options.mission, {.site_folder = options.site,
                                                          .robot_file = {},
                                                          .has_seed = options.seed.has_value(),
@@ -61,7 +61,7 @@ boost::json::array keys_json() {
 }  // namespace
 
 void add_check_command(CLI::App& app, Run& run) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<CheckOptions>();
   auto* command = app.add_subcommand(
       "check",
       "Reads a mission, its robot and its site; reports every error, or what will be used");

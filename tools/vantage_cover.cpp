@@ -57,7 +57,7 @@ std::string judgement_text(const std::vector<CoverJudgement>& judgements) {
 namespace vantage {
 namespace {
 
-struct Options {
+struct CoverOptions {
   SiteOptions site;
   double exact_s = 60;
   bool json = false;
@@ -75,7 +75,7 @@ boost::json::array judgements_json(const std::vector<tools::CoverJudgement>& jud
   return areas;
 }
 
-int cover(const Options& options) {
+int cover(const CoverOptions& options) {
   const mission::Prepared site = prepared(options.site, mission::WorldUse::none);
   const auto judgements =
       tools::judge_covers(site.config, site.site.map, site.tasks, options.exact_s,
@@ -90,7 +90,7 @@ int cover(const Options& options) {
 }  // namespace
 
 void add_cover_command(CLI::App& app, Run& run) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<CoverOptions>();
   auto* command = app.add_subcommand(
       "cover",
       "Plans Phase I and tells how few stations the same candidates would need, by an integer "

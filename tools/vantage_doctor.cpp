@@ -14,7 +14,7 @@
 namespace vantage {
 namespace {
 
-struct Options {
+struct DoctorOptions {
   std::filesystem::path robot;
   double wait_s = 20;
   bool json = false;
@@ -107,7 +107,7 @@ hal::Task<void> look(const mission::RobotDrivers& drivers, const mission::Hardwa
     co_await clock.sleep_for(std::chrono::milliseconds(100));
 }
 
-int diagnose(const Options& options) {
+int diagnose(const DoctorOptions& options) {
   const mission::MissionConfig config = robot_config(options.robot);
   boost::asio::io_context io{1};
   drivers::RealClock clock;
@@ -145,7 +145,7 @@ int diagnose(const Options& options) {
 }  // namespace
 
 void add_doctor_command(CLI::App& app, Run& run) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<DoctorOptions>();
   auto* command = app.add_subcommand(
       "doctor", "Opens every device of a robot: found, identified, healthy, or why not");
   command->footer(

@@ -6,7 +6,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <numbers>
 
 #include "nav/localizer.hpp"
 #include "nav/start_finder.hpp"
@@ -18,7 +17,6 @@ namespace {
 
 namespace json = boost::json;
 
-constexpr double kDeg = std::numbers::pi / 180;
 constexpr double kStartSigma_m = 0.05, kStartSigmaRad = 1 * kDeg;  // Of a surveyed start.
 
 struct LocalizeOptions {

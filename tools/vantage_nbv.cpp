@@ -15,7 +15,7 @@
 namespace vantage {
 namespace {
 
-struct Options {
+struct NbvOptions {
   SiteOptions site;
   std::filesystem::path map, tally, svg;
   int count = 5;
@@ -61,7 +61,7 @@ mission::ViewTrip trip_to(const std::vector<mission::ViewAhead>& views,
                                 site.tasks.start.position_m);
 }
 
-Views look(const Options& options) {
+Views look(const NbvOptions& options) {
   PastSite past = past_site(options.site, options.map);
   Views views{std::move(past.site), past.map_file, std::move(past.model), {}, {}, {}, {}, 0, 0};
   const std::vector<mission::CellTally> around = views.model.tally();
@@ -218,7 +218,7 @@ std::string heat_svg(const Views& views) {
   return mission::heat_map_svg(views.site.site.map, heat);
 }
 
-int nbv(const Options& options) {
+int nbv(const NbvOptions& options) {
   const Views views = look(options);
   if (!options.tally.empty()) write_product(options.tally, tally_csv(views));
   if (!options.svg.empty()) write_product(options.svg, heat_svg(views));
@@ -238,7 +238,7 @@ int nbv(const Options& options) {
 }  // namespace
 
 void add_nbv_command(CLI::App& app, Run& run) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<NbvOptions>();
   auto* command = app.add_subcommand(
       "nbv", "Works out the next best views from the voxel map that a run left behind");
   command->footer(

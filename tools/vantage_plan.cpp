@@ -11,7 +11,7 @@
 namespace vantage {
 namespace {
 
-struct Options {
+struct PlanOptions {
   SiteOptions site;
   std::filesystem::path svg, out;
   std::string bound;
@@ -34,7 +34,7 @@ void write_plan(const std::filesystem::path& file, const mission::PlanPreview& p
 }
 
 // What an integer programme says of every area, beside the planner's own proof.
-void add_exact(const Options& options, const mission::Prepared& site,
+void add_exact(const PlanOptions& options, const mission::Prepared& site,
                const mission::PlanPreview& preview, boost::json::object& as_json,
                std::string& text) {
   auto& areas = as_json["areas"].as_array();
@@ -49,7 +49,7 @@ void add_exact(const Options& options, const mission::Prepared& site,
   }
 }
 
-int plan(const Options& options) {
+int plan(const PlanOptions& options) {
   const mission::Prepared site = prepared(options.site, mission::WorldUse::none);
   const mission::PlanPreview preview = mission::preview_plan(
       site.config, site.site.map, site.tasks, mission::threads_or_all(options.site.threads));
@@ -70,7 +70,7 @@ int plan(const Options& options) {
 }  // namespace
 
 void add_plan_command(CLI::App& app, Run& run) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<PlanOptions>();
   auto* command = app.add_subcommand(
       "plan",
       "Plans the stations of a site: where, what each adds, how long, what stays uncovered");

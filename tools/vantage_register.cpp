@@ -6,7 +6,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <numbers>
 #include <thread>
 
 #include "mission/files.hpp"
@@ -19,8 +18,6 @@ namespace vantage {
 namespace {
 
 namespace json = boost::json;
-
-constexpr double kDeg = std::numbers::pi / 180;
 
 struct RegisterOptions {
   std::filesystem::path reference, reading;

@@ -13,7 +13,7 @@
 namespace vantage {
 namespace {
 
-struct Options {
+struct RehearseOptions {
   SiteOptions site;
   std::filesystem::path model, out, save;
   bool json = false;
@@ -73,12 +73,12 @@ void print_outcome(const mission::RunOutcome& outcome, const mission::SavedPlan&
 }
 
 // runs/fort-rehearsal for a mission of fort.toml.
-std::filesystem::path folder_of(const Options& options) {
+std::filesystem::path folder_of(const RehearseOptions& options) {
   if (!options.out.empty()) return options.out;
   return std::filesystem::path("runs") / (options.site.mission.stem().string() + "-rehearsal");
 }
 
-int rehearse(const Options& options) {
+int rehearse(const RehearseOptions& options) {
   const std::filesystem::path out = folder_of(options);
   mission::Prepared site = prepared(options.site, mission::WorldUse::world, options.model);
   if (!options.model.empty())
@@ -110,7 +110,7 @@ int rehearse(const Options& options) {
 }  // namespace
 
 void add_rehearse_command(CLI::App& app, Run& run) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<RehearseOptions>();
   auto* command = app.add_subcommand(
       "rehearse", "Runs a mission in a model of the site and saves where it scanned as a plan");
   command->footer(

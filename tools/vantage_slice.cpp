@@ -11,7 +11,7 @@
 namespace vantage {
 namespace {
 
-struct Options {
+struct SliceOptions {
   std::filesystem::path map, svg;
   double z_m{};
   bool json = false;
@@ -24,7 +24,7 @@ int layer_at(const planning::VoxelGrid& grid, double z_m) {
                             z_m, grid.W_min_m.z(), grid.W_min_m.z() + grid.nz * grid.voxel_m));
 }
 
-int slice(const Options& options) {
+int slice(const SliceOptions& options) {
   const mission::PastRun past = past_run(options.map);
   const planning::VoxelGrid& grid = past.map.grid();
   const int z = layer_at(grid, options.z_m);
@@ -51,7 +51,7 @@ int slice(const Options& options) {
 }  // namespace
 
 void add_slice_command(CLI::App& app, Run& run) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<SliceOptions>();
   auto* command = app.add_subcommand("slice", "Draws one layer of a run's voxel map");
   command->footer(
       "Examples:\n"

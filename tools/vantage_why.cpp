@@ -13,7 +13,7 @@
 namespace vantage {
 namespace {
 
-struct Options {
+struct WhyOptions {
   SiteOptions site;
   std::filesystem::path map;
   std::string wall, station, voxel, cell;
@@ -50,7 +50,7 @@ boost::json::object wall_json(const mission::WallAnswer& answer) {
   return out;
 }
 
-int why_wall(const Options& options) {
+int why_wall(const WhyOptions& options) {
   const Eigen::Vector2d wall_m = parse_xy(options.wall, "--wall");
   const Eigen::Vector2d station_m = parse_xy(options.station, "--station");
   const mission::Prepared site = prepared(options.site, mission::WorldUse::none);
@@ -94,7 +94,7 @@ boost::json::object voxel_json(const mission::VoxelAnswer& answer,
   return out;
 }
 
-planning::Voxel voxel_of(const Options& options, const planning::VoxelGrid& grid) {
+planning::Voxel voxel_of(const WhyOptions& options, const planning::VoxelGrid& grid) {
   const std::vector<double> at = parse_numbers(options.voxel, 3, "VOXEL");
   if (!options.index) return grid.voxel_at({at[0], at[1], at[2]});
   for (const double index : at)
@@ -104,7 +104,7 @@ planning::Voxel voxel_of(const Options& options, const planning::VoxelGrid& grid
   return {static_cast<int>(at[0]), static_cast<int>(at[1]), static_cast<int>(at[2])};
 }
 
-int why_voxel(const Options& options) {
+int why_voxel(const WhyOptions& options) {
   const PastSite past = past_site(options.site, options.map);
   const planning::VoxelGrid& grid = past.model.map().grid();
   const mission::VoxelAnswer answer =
@@ -121,7 +121,7 @@ int why_voxel(const Options& options) {
   return kFine;
 }
 
-int why(const Options& options) {
+int why(const WhyOptions& options) {
   const bool voxel = !options.voxel.empty() && !options.cell.empty() && !options.map.empty();
   const bool wall = !options.wall.empty() && !options.station.empty();
   if (voxel == wall)
@@ -133,7 +133,7 @@ int why(const Options& options) {
 }  // namespace
 
 void add_why_command(CLI::App& app, Run& run) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<WhyOptions>();
   auto* command = app.add_subcommand(
       "why", "Says why a place on a wall, or a voxel, is not seen from somewhere");
   command->footer(

@@ -75,28 +75,46 @@ TEST_F(Hardware, IsRefusedWhereTheMapDoesNotSayWhereItLies) {
   EXPECT_THAT(outcome.err, HasSubstr("\"origin\""));
 }
 
-// The units of everything but the drive run; vantaged says what it waits for, and a signal ends it
-// with a report.
-TEST_F(Hardware, SaysWhatItWaitsForAndStopsForASignal) {
-  const std::string folder = folder_.path().string();
-  const std::string units = std::string(VANTAGE_BINARY_DIR) + "/vantage-units " +
-                            (kYard / "mission.toml").string() + " --folder " + folder +
-                            "/ports </dev/null >" + folder + "/links 2>&1 & echo $! >" + folder +
-                            "/pid";
-  ASSERT_EQ(std::system(units.c_str()), 0);
-  const auto links = [&] { return test::read_text(folder_.path() / "links"); };
-  for (int i = 0; i < 300 && links().find("[gnss]") == std::string::npos; ++i)
-    std::this_thread::sleep_for(100ms);
-  std::this_thread::sleep_for(500ms);
-  make_yard("[drive]\nlink = \"can:vantage9\"\n" + links());
-  const test::Outcome outcome = vantaged("timeout --preserve-status -s TERM 20 ");
-  kill(std::atoi(test::read_text(folder_.path() / "pid").c_str()), SIGTERM);
+// The units of everything but the drive run; vantaged says what it waits for.
+class WaitingHardware : public Hardware {
+ protected:
+  void SetUp() override {
+    Hardware::SetUp();
+    const std::string folder = folder_.path().string();
+    const std::string units = std::string(VANTAGE_BINARY_DIR) + "/vantage-units " +
+                              (kYard / "mission.toml").string() + " --folder " + folder +
+                              "/ports </dev/null >" + folder + "/links 2>&1 & echo $! >" + folder +
+                              "/pid";
+    ASSERT_EQ(std::system(units.c_str()), 0);
+    const auto links = [&] { return test::read_text(folder_.path() / "links"); };
+    for (int i = 0; i < 300 && links().find("[gnss]") == std::string::npos; ++i)
+      std::this_thread::sleep_for(100ms);
+    std::this_thread::sleep_for(500ms);
+    make_yard("[drive]\nlink = \"can:vantage9\"\n" + links());
+  }
+  void TearDown() override {
+    const int pid = std::atoi(test::read_text(folder_.path() / "pid").c_str());
+    if (pid > 0) kill(pid, SIGTERM);
+  }
+};
+
+TEST_F(WaitingHardware, SaysWhatItWaitsForAndStopsForASignal) {
+  const test::Outcome outcome = vantaged("timeout --foreground --preserve-status -s TERM 20 ");
   EXPECT_EQ(outcome.code, 3) << outcome.err;
   EXPECT_THAT(outcome.err, HasSubstr("waits for drive (agilex-scout2 at can:vantage9): not there"));
   for (const char* role : {"; scanner (", "; pan (", "; imu (", "; gnss ("})
     EXPECT_THAT(outcome.err.substr(outcome.err.rfind("waits for")), Not(HasSubstr(role)));
   EXPECT_THAT(outcome.out, HasSubstr("NOT completed: stopped by SIGTERM"));
   EXPECT_TRUE(std::filesystem::exists(run_folder() + "/report.html"));
+}
+
+// As `timeout` without --foreground does it, or a terminal whose shell hands the signal on.
+TEST_F(WaitingHardware, TakesASignalThatComesThreeTimesAtOnceForOne) {
+  const test::Outcome outcome =
+      vantaged("sh -c 'until grep -q waits " + (folder_.path() / "err").string() +
+               "; do sleep 0.2; done; kill $PPID; kill $PPID; kill $PPID' & exec ");
+  EXPECT_EQ(outcome.code, 3) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("NOT completed: stopped by SIGTERM"));
 }
 
 }  // namespace
