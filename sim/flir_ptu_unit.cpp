@@ -145,7 +145,7 @@ FlirPtuUnit::Answered FlirPtuUnit::number(std::int64_t value, std::string_view w
 
 FlirPtuUnit::Answered FlirPtuUnit::position(const Request& request) {
   if (request.value) return go(*request.value);
-  const double told = motion_.at(clock_.now()) * faults_.wrong_factor();
+  const double told = motion_.at(clock_.now() - config_.position_age) * faults_.wrong_factor();
   return number(std::llround(told), "Current Pan position");
 }
 

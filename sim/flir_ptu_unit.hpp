@@ -22,6 +22,7 @@ struct FlirPtuUnitConfig {
   double acceleration_radps2 = 25 * 0.017453292519943295;       // At power-up.
   hal::Duration latency = std::chrono::milliseconds(2);         // From a request to its answer,
   hal::Duration latency_jitter = std::chrono::milliseconds(8);  // and how much later sometimes.
+  hal::Duration position_age{};                                 // Of what it tells of a motion.
   hal::Duration reset_time = std::chrono::seconds(12);          // At power-up, without answers.
   std::string version = "Pan-Tilt Controller v3.02.2 (E46-70), (C)2014 FLIR";
   std::uint64_t seed = 1;

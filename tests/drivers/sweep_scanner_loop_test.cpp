@@ -135,6 +135,26 @@ TEST_F(SweepLoop, ScansAgainAndAgain) {
   }
 }
 
+// A head whose positions are 20 ms old when it tells them: half a degree at 25 deg/s.
+TEST_F(SweepLoop, ScansStraightWithOldPositionsWhenItKnowsHowOld) {
+  Setting setting;
+  setting.ptu_unit.position_age = 20ms;
+  setting.sweep.pan_late_s = 0.02;
+  build(setting);
+  const auto cloud = scan();
+  ASSERT_TRUE(cloud) << told_all();
+  EXPECT_LT(worst_off_the_walls(*cloud), 0.004);
+}
+
+TEST_F(SweepLoop, ScansCrookedlyWithOldPositionsThatItTakesForNew) {
+  Setting setting;
+  setting.ptu_unit.position_age = 20ms;
+  build(setting);
+  const auto cloud = scan();
+  ASSERT_TRUE(cloud) << told_all();
+  EXPECT_GT(worst_off_the_walls(*cloud), 0.02);
+}
+
 TEST_F(SweepLoop, ScansAsAnLms511WhoseTelegramsComeATurnLate) {
   Setting setting;
   setting.lms.settings.lms5xx = setting.lms_unit.lms5xx = true;
