@@ -10,7 +10,7 @@ namespace errc = boost::system::errc;
 
 constexpr hal::Duration kLook = 50ms;
 constexpr hal::Duration kTryAgain = 100ms;
-constexpr hal::Duration kScanAgain = 5s;  // By then a loss that made it fail shows.
+constexpr hal::Duration kLossShows = 5s;  // That made a scan fail.
 
 bool away(const NamedDevice& named) {
   return named.device->state() != drivers::DeviceState::running;
@@ -133,17 +133,14 @@ hal::Task<hal::Result<hal::GnssFix>> WatchedGnss::next_fix() {
 }
 
 hal::Task<hal::Result<hal::ScanCloud>> WatchedScanner::scan() {
-  for (int tries = 1;; ++tries) {
-    co_await watch_.until_well();
-    auto cloud = co_await drivers_.scanner().scan();
-    if (cloud) co_return cloud;
-    const std::string& problem = drivers_.scan_problem();
-    watch_.note(fmt::format("scan failed, try {} of {}: {}", tries, kTriesMax,
-                            problem.empty() ? cloud.error().message() : problem));
-    if (tries == kTriesMax) co_return cloud;
-    co_await clock_.sleep_for(kScanAgain);
-    watch_.look();
-  }
+  co_await watch_.until_well();
+  auto cloud = co_await drivers_.scanner().scan();
+  if (cloud) co_return cloud;
+  const std::string& problem = drivers_.scan_problem();
+  watch_.note("scan failed: " + (problem.empty() ? cloud.error().message() : problem));
+  co_await clock_.sleep_for(kLossShows);
+  watch_.look();
+  co_return cloud;
 }
 
 hal::Task<hal::Result<hal::SurveyedPose>> NobodyToPlace::place(std::string_view, hal::Pose2) {

@@ -94,10 +94,10 @@ class WatchedGnss final : public hal::Gnss {
   hal::Clock& clock_;
 };
 
-// Takes a scan that failed again, twice at most.
+// Scans when every device is there. Says why a scan failed, and returns when a loss that made it
+// fail has shown: taking it again is the survey's.
 class WatchedScanner final : public hal::Scanner {
  public:
-  static constexpr int kTriesMax = 3;
   WatchedScanner(RobotDrivers& drivers, DeviceWatch& watch, hal::Clock& clock)
       : drivers_(drivers), watch_(watch), clock_(clock) {}
   hal::Task<hal::Result<hal::ScanCloud>> scan() override;

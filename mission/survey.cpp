@@ -129,10 +129,22 @@ hal::Task<void> Survey::run() {
 hal::Task<void> Survey::survey() {
   co_await plan_stations();
   for (std::size_t t = 0; t < record_.plans.size(); ++t) co_await tour(t);
+  if (record_.scans.empty()) throw CannotGoOn(why_no_scan());
   co_await refine();
   co_await go_home();
   note_box();
   record_.completed = true;
+}
+
+// Nothing seen is nothing to go on from: no next best view could follow.
+std::string Survey::why_no_scan() const {
+  if (record_.dropped.empty())
+    return "not one scan was taken: the plan has no stations, for no wall of the map can be "
+           "scanned "
+           "from where the robot can stand";
+  const DroppedStation& last = record_.dropped.back();
+  return fmt::format("not one scan was taken; the last of {} dropped stations, {}: {}",
+                     record_.dropped.size(), last.name, last.reason);
 }
 
 // A box that is too low hides what the scans saw above it: the operator has to know.

@@ -55,6 +55,7 @@ class Survey {
   hal::Task<void> tour(std::size_t task);
   hal::Task<void> refine();
   hal::Task<void> go_home();
+  std::string why_no_scan() const;
   void note_box();
   void note_gnss();
 

@@ -156,7 +156,24 @@ TEST(GuardedSurvey, TakesAScanAgainThatLostItsScanner) {
   ASSERT_TRUE(sim.run_to_the_end());
   EXPECT_EQ(sim.yard.survey().failure(), "") << sim.yard.notes();
   EXPECT_EQ(scans(), 2U);
-  EXPECT_THAT(sim.yard.notes(), HasSubstr("scan failed, try 1 of 3"));
+  EXPECT_THAT(sim.yard.notes(), HasSubstr("scan failed: "));
+}
+
+// Three tries at a stop: no more, whoever else would try again. The yard has one station.
+TEST(GuardedSurvey, TriesAScanThreeTimesAndDoesNotCallNoScanASurvey) {
+  SimYard sim;
+  ASSERT_TRUE(sim.run_until_it_drives(0.2));
+  sim.yard.faults("pan").set({sim::UnitFault::wrong, 0.3});
+  ASSERT_TRUE(sim.run_to_the_end());
+  const std::string notes = sim.yard.notes();
+  int failed = 0;
+  for (auto at = notes.find("scan failed: "); at != std::string::npos;
+       at = notes.find("scan failed: ", at + 1))
+    ++failed;
+  EXPECT_EQ(failed, 3) << notes;
+  EXPECT_FALSE(sim.yard.survey().survey().record().completed);
+  EXPECT_THAT(sim.yard.survey().failure(), HasSubstr("not one scan was taken"));
+  EXPECT_THAT(sim.yard.survey().failure(), HasSubstr("no scan, tried 3 times"));
 }
 
 TEST(GuardedSurvey, StandsAtOnceWhenStopped) {
