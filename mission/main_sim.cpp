@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "hal/angles.hpp"
 #include "mission/files.hpp"
 #include "nav/polygons.hpp"
 #include "nav/raster.hpp"
@@ -86,10 +87,6 @@ std::vector<Eigen::Vector3d> ground_samples(const std::vector<AreaTask>& tasks) 
                                task.area.ground_z_m);
   }
   return samples;
-}
-
-double wrapped(double angle_rad) {
-  return std::remainder(angle_rad, 2 * std::numbers::pi);
 }
 
 }  // namespace
@@ -192,7 +189,7 @@ void SimBackend::judge_poses(RunRecord& record, Truth& truth) const {
     scan.truth = at.at.pose;
     Eigen::Vector3d error;
     error << scan.believed.position_m - at.at.pose.position_m,
-        wrapped(scan.believed.heading_rad - at.at.pose.heading_rad);
+        hal::wrapped(scan.believed.heading_rad - at.at.pose.heading_rad);
     const double distance_m = error.head<2>().norm();
     truth.position_error_max_m = std::max(truth.position_error_max_m, distance_m);
     truth.heading_error_max_rad = std::max(truth.heading_error_max_rad, std::abs(error.z()));

@@ -5,6 +5,8 @@
 #include <limits>
 #include <numbers>
 
+#include "hal/angles.hpp"
+
 namespace nav {
 namespace {
 
@@ -21,10 +23,6 @@ constexpr double kGoalReachedM = 0.012;
 constexpr double kProjectionWindowM = 0.6;
 constexpr double kProgressMinM = 0.01;
 constexpr double kCorrectionProgressMinM = 0.003;
-
-double wrapped(double angle_rad) {
-  return std::remainder(angle_rad, 2 * std::numbers::pi);
-}
 
 double bearing_rad(const Vector2d& along) {
   return std::atan2(along.y(), along.x());
@@ -61,8 +59,8 @@ class Line {
   int leg_end(int from, double corner_min_rad) const {
     int vertex = from + 1;
     for (; vertex < last(); ++vertex)
-      if (std::abs(wrapped(bearing_rad(direction(vertex)) - bearing_rad(direction(vertex - 1)))) >
-          corner_min_rad)
+      if (std::abs(hal::wrapped(bearing_rad(direction(vertex)) -
+                                bearing_rad(direction(vertex - 1)))) > corner_min_rad)
         break;
     return vertex;
   }
@@ -179,7 +177,7 @@ class Step {
     const double ahead_m =
         std::max(config_.lookahead_min_m, config_.lookahead_s * std::abs(state_.speed_mps));
     const Vector2d to_target = line_.place(state_.progress_m + ahead_m, end) - pose_.position_m;
-    const double off_rad = wrapped(bearing_rad(to_target) - pose_.heading_rad);
+    const double off_rad = hal::wrapped(bearing_rad(to_target) - pose_.heading_rad);
     const bool turning = state_.phase == FollowPhase::turning;
     if (std::abs(off_rad) > (turning ? kTurnDoneRad : kTurnAgainRad)) {
       enter(FollowPhase::turning);
@@ -249,9 +247,9 @@ class Step {
       return {};
     }
     const Vector2d to_goal = line_.point(line_.last()) - pose_.position_m;
-    double off_rad = wrapped(bearing_rad(to_goal) - pose_.heading_rad);
+    double off_rad = hal::wrapped(bearing_rad(to_goal) - pose_.heading_rad);
     const bool backwards = std::abs(off_rad) > std::numbers::pi / 2;
-    if (backwards) off_rad = wrapped(off_rad + std::numbers::pi);
+    if (backwards) off_rad = hal::wrapped(off_rad + std::numbers::pi);
     if (std::abs(off_rad) > 0.25) return turn(off_rad);
     const double speed_mps = std::min({config_.crawl_mps, config_.speed_max_mps, distance_m});
     const double rate =
@@ -261,7 +259,7 @@ class Step {
 
   hal::Twist align() {
     const double off_rad =
-        path_.final_heading_rad ? wrapped(*path_.final_heading_rad - pose_.heading_rad) : 0;
+        path_.final_heading_rad ? hal::wrapped(*path_.final_heading_rad - pose_.heading_rad) : 0;
     if (std::abs(off_rad) > config_.heading_tolerance_rad * 0.6) return turn(off_rad);
     state_.in_tolerance = goal_distance_m() <= config_.position_tolerance_m;
     if (!state_.in_tolerance && state_.corrections < config_.corrections_max) {

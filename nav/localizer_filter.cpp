@@ -4,8 +4,8 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "hal/angles.hpp"
 #include "nav/registration/rigid.hpp"
 
 namespace nav {
@@ -18,10 +18,6 @@ constexpr double kTurnFloor_radps = 0.002;
 constexpr double kFixLagMax_s = 0.5;
 constexpr double kFixSigmaMin_m = 0.001;
 constexpr double kGravity_mps2 = 9.80665;
-
-double wrapped(double angle_rad) {
-  return std::remainder(angle_rad, 2 * std::numbers::pi);
-}
 
 double heading_of(const Eigen::Matrix3d& R) {
   return std::atan2(R(1, 0), R(0, 0));
@@ -328,7 +324,7 @@ Gate LocalizerFilter::take(const LocalizerConfig& config, const PoseFix& fix) {
   H(0, kP) = H(1, kP + 1) = H(2, kHeading) = 1;
   Eigen::Vector3d innovation;
   innovation << fix.pose.position_m - position_m_.head<2>() - ahead_m(fix.stamp),
-      wrapped(fix.pose.heading_rad - heading_of(R_W_B_));
+      hal::wrapped(fix.pose.heading_rad - heading_of(R_W_B_));
   const Gate gate = update<3>(config, Source::pose_fix, fix.stamp, H, innovation, fix.covariance);
   if (gate == Gate::accepted) {
     move_ = {};
@@ -347,12 +343,12 @@ Gate LocalizerFilter::take(const LocalizerConfig& config, const PoseFix& fix) {
 // Poses that are right all move the localizer's by the same, however it drives on.
 bool LocalizerFilter::lost(const LocalizerConfig& config, const PoseFix& fix) {
   constexpr double kSame_m = 0.5, kSameRad = 0.15;
-  const double turn_rad = wrapped(fix.pose.heading_rad - heading_of(R_W_B_));
+  const double turn_rad = hal::wrapped(fix.pose.heading_rad - heading_of(R_W_B_));
   const Eigen::Vector2d here = position_m_.head<2>();
   const Eigen::Vector2d shift_m = fix.pose.position_m - Eigen::Rotation2Dd(turn_rad) * here;
   const Eigen::Vector2d expected = Eigen::Rotation2Dd(move_.turn_rad) * here + move_.shift_m;
   const bool same = move_.count > 0 && (expected - fix.pose.position_m).norm() < kSame_m &&
-                    std::abs(wrapped(turn_rad - move_.turn_rad)) < kSameRad;
+                    std::abs(hal::wrapped(turn_rad - move_.turn_rad)) < kSameRad;
   move_ = {turn_rad, shift_m, same ? move_.count + 1 : 1};
   return move_.count >= config.lost_poses;
 }
@@ -370,7 +366,7 @@ Gate LocalizerFilter::take(const LocalizerConfig& config, const LandmarkSighting
   H(1, kHeading) = -1;
   const Eigen::Vector2d innovation(
       sighting.range_m - range_m,
-      wrapped(sighting.bearing_rad - std::atan2(way.y(), way.x()) + heading_of(R_W_B_)));
+      hal::wrapped(sighting.bearing_rad - std::atan2(way.y(), way.x()) + heading_of(R_W_B_)));
   const Eigen::Vector2d sigmas(sighting.range_sigma_m, sighting.bearing_sigma_rad);
   return update<2>(config, Source::landmark, sighting.stamp, H, innovation,
                    sigmas.cwiseAbs2().asDiagonal());

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "hal/angles.hpp"
+
 namespace sim {
 namespace {
 
@@ -29,10 +31,6 @@ const double kTick_s = hal::seconds(World::kTick);
 
 boost::system::error_code error(boost::system::errc::errc_t code) {
   return boost::system::errc::make_error_code(code);
-}
-
-double wrapped(double angle_rad) {
-  return std::remainder(angle_rad, 2 * std::numbers::pi);
 }
 
 }  // namespace
@@ -136,7 +134,7 @@ void World::tick() {
   const double right_m = roll(right_);
   const double before_rad = robot_.pose.heading_rad;
   move(left_m, right_m);
-  yaw_rate_radps_ = wrapped(robot_.pose.heading_rad - before_rad) / kTick_s;
+  yaw_rate_radps_ = hal::wrapped(robot_.pose.heading_rad - before_rad) / kTick_s;
 }
 
 double World::roll(Side& side) {
@@ -156,7 +154,7 @@ void World::move(double left_m, double right_m) {
   const double course_rad = robot_.pose.heading_rad + turn_rad / 2;
   StandingPose to = robot_;
   to.pose.position_m += chord_m * Eigen::Vector2d(std::cos(course_rad), std::sin(course_rad));
-  to.pose.heading_rad = wrapped(to.pose.heading_rad + turn_rad);
+  to.pose.heading_rad = hal::wrapped(to.pose.heading_rad + turn_rad);
   clear_m_ -= std::abs(chord_m);
   ground_checked_m_ += std::abs(chord_m);
   if (ground_checked_m_ >= kGroundLook_m)

@@ -5,7 +5,6 @@
 #include <boost/json/object.hpp>
 #include <filesystem>
 #include <functional>
-#include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -15,8 +14,6 @@
 #include "mission/past_run.hpp"
 
 namespace vantage {
-
-constexpr double kDeg = std::numbers::pi / 180;
 
 // Exit codes: what scripts may rely on.
 constexpr int kFine = 0, kFailed = 1, kRefused = 2;

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "hal/angles.hpp"
 #include "nav/localizer.hpp"
 #include "nav/start_finder.hpp"
 #include "tools/vantage_command.hpp"
@@ -14,6 +15,8 @@
 
 namespace vantage {
 namespace {
+
+using hal::kDeg;
 
 namespace json = boost::json;
 

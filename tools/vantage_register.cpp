@@ -8,6 +8,7 @@
 #include <memory>
 #include <thread>
 
+#include "hal/angles.hpp"
 #include "mission/files.hpp"
 #include "nav/registration/cloud_file.hpp"
 #include "nav/registration/registration.hpp"
@@ -16,6 +17,8 @@
 
 namespace vantage {
 namespace {
+
+using hal::kDeg;
 
 namespace json = boost::json;
 

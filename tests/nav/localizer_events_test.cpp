@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "hal/angles.hpp"
 #include "nav/localizer.hpp"
 #include "nav/start_finder.hpp"
 #include "tests/support/random_site.hpp"
@@ -15,7 +16,7 @@ namespace {
 using nav::Gate;
 using nav::LocalizerEvent;
 
-constexpr double kDeg = std::numbers::pi / 180;
+using hal::kDeg;
 constexpr double kStep_s = 0.05;
 constexpr double kGravity = 9.80665;
 

@@ -12,9 +12,11 @@
 #include <random>
 #include <vector>
 
+#include "hal/angles.hpp"
+
 namespace {
 
-constexpr double kDeg = std::numbers::pi / 180;
+using hal::kDeg;
 constexpr double kStep_s = 0.05;
 
 // The true errors of the devices; the filter is told the sigmas, not the values.

@@ -13,12 +13,13 @@
 #include <sstream>
 #include <vector>
 
+#include "hal/angles.hpp"
 #include "nav/localizer.hpp"
 #include "nav/scan_match.hpp"
 
 namespace {
 
-constexpr double kDeg = std::numbers::pi / 180;
+using hal::kDeg;
 
 std::filesystem::path folder(const std::string& log) {
   return std::filesystem::path(VANTAGE_SOURCE_DIR) / "../shared/data/logs" / log;

@@ -6,17 +6,17 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <numbers>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "hal/angles.hpp"
 #include "nav/registration/registration.hpp"
 #include "tests/support/random_site.hpp"
 
 namespace scans {
 
-constexpr double kDeg = std::numbers::pi / 180;
+using hal::kDeg;
 
 inline Eigen::Isometry3d pose(double x_m, double y_m, double z_m, double yaw_deg,
                               double pitch_deg = 0, double roll_deg = 0) {
