@@ -10,7 +10,8 @@ with_links() { # ROBOT FILE, LINKS FILE
     END { for (table in lines) printf "%s\n%s", table, lines[table] }' "$2" "$1"
 }
 
-start_units() {
+start_units() { # The mission of another folder than the yard, if given.
+  local yard=${1:-$yard}
   mkdir -p $here
   /host/bin/vantage-units $yard/mission.toml --folder $here/ports --can vcan0 --threads 1 \
     >$here/links 2>/tmp/units.log </dev/null &
