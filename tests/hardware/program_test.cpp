@@ -111,7 +111,7 @@ TEST_F(WaitingHardware, SaysWhatItWaitsForAndStopsForASignal) {
 // As `timeout` without --foreground does it, or a terminal whose shell hands the signal on.
 TEST_F(WaitingHardware, TakesASignalThatComesThreeTimesAtOnceForOne) {
   const test::Outcome outcome =
-      vantaged("sh -c 'until grep -q waits " + (folder_.path() / "err").string() +
+      vantaged("sh -c 'until grep -qs waits " + (folder_.path() / "err").string() +
                "; do sleep 0.2; done; kill $PPID; kill $PPID; kill $PPID' & exec ");
   EXPECT_EQ(outcome.code, 3) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("NOT completed: stopped by SIGTERM"));
