@@ -18,6 +18,7 @@ int main(int argc, char** argv) {
       "  vantage doctor configs/robots/scout_lms511.toml\n"
       "  vantage register scan1.ply scan2.ply\n"
       "  vantage localize --odometry wheels.csv --gnss rover.ubx --out way.tum\n"
+      "  vantage explain F012\n"
       "Each command has its own --help, with examples. Every command knows --json.\n"
       "Exit: 0 fine, 1 tried and failed, 2 refused (every reason is on stderr, one a line).");
   app.require_subcommand(1);
@@ -35,6 +36,7 @@ int main(int argc, char** argv) {
   vantage::add_doctor_command(app, run);
   vantage::add_register_command(app, run);
   vantage::add_localize_command(app, run);
+  vantage::add_explain_command(app, run);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
