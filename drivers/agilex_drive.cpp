@@ -27,6 +27,12 @@ constexpr hal::Duration kAnswerLate = 100ms;
 constexpr hal::Duration kRemembered = 2s;  // Troubles that come and go are shown for so long.
 constexpr hal::Duration kListening = 1s;   // Before silence at the start is trouble.
 constexpr hal::Duration kReleaseStand = 200ms;
+// The proof of the base's own time-out.
+constexpr agilex::MotionCommand kCreep{.forward_mmps = 20};
+constexpr int kCreeps_mmps = 10, kStands_mmps = 4;  // What it reports.
+constexpr hal::Duration kCreepMax = 1s;             // Until it is seen to move.
+// After 500 ms it brakes: by then at half speed, by then it stands.
+constexpr hal::Duration kHalfMax = 800ms, kStandsMax = 1200ms;
 constexpr int kStrangers = 3;  // So many strange frames are no accident.
 
 constexpr Fault kFaults[] = {
@@ -65,6 +71,8 @@ constexpr Fault kFaults[] = {
      "drive a measured metre; check the wheel sensors; service"},
     {17, "way blocked", "the wheels stand though they are told to turn",
      "free the robot; see whether something blocks its wheels"},
+    {18, "another program commands the base", "its commands were seen on the bus",
+     "end the other program; take its adapter off the bus"},
 };
 enum Which {
   kSilent,
@@ -83,7 +91,8 @@ enum Which {
   kLate,
   kJumped,
   kDisagree,
-  kBlocked
+  kBlocked,
+  kForeign
 };
 
 Trouble trouble(Which which, std::string detail = {}) {
@@ -260,6 +269,11 @@ void AgilexDrive::on(const agilex::Version& version, hal::Time at) {
                        number(version.driver_software);
 }
 
+// Nobody but us may command it, and what we send does not come back to us.
+void AgilexDrive::on(const agilex::MotionCommand&, hal::Time at) {
+  heard_.foreign_at = at;
+}
+
 // --- What it is told.
 
 hal::Task<void> AgilexDrive::keep() {
@@ -285,11 +299,13 @@ hal::Task<void> AgilexDrive::send(const hal::CanFrame& frame) {
 }
 
 std::optional<hal::CanFrame> AgilexDrive::next_frame(hal::Time now) {
+  const bool rolled = told_.forward_mmps != 0 || told_.turn_mradps != 0;
   told_ = {};
   if (!talks(now))  // It may still hear.
     return within(talked_at_, now, kStopping) ? std::optional(encode(told_)) : std::nullopt;
   const agilex::SystemState& system = *heard_.system;
-  if (system.mode == agilex::ControlMode::rc) return std::nullopt;  // It would fight the person.
+  if (system.mode == agilex::ControlMode::rc)  // More than one would fight the person.
+    return rolled ? std::optional(encode(told_)) : std::nullopt;
   if (released_ && now - released_at_ > kReleaseStand)
     return system.mode == agilex::ControlMode::can
                ? std::optional(encode(agilex::ControlModeCommand{agilex::ControlMode::standby}))
@@ -299,7 +315,9 @@ std::optional<hal::CanFrame> AgilexDrive::next_frame(hal::Time now) {
   if (system.vehicle == agilex::VehicleState::exception && !std::exchange(cleared_, true))
     return encode(agilex::ResetCommand{});
   if (system.vehicle == agilex::VehicleState::normal) cleared_ = false;
-  if (drives(now)) told_ = motion(now);
+  if (!drives(now)) return encode(told_);
+  told_ = proof_ == Proof::none ? motion(now) : kCreep;
+  if (proof_ == Proof::nothing) return std::nullopt;
   return encode(told_);
 }
 
@@ -325,13 +343,72 @@ hal::Task<hal::Result<void>> AgilexDrive::command(hal::Twist twist) {
     co_return make_error_code(errc::invalid_argument);
   const hal::Time now = clock_.now();
   wanted_ = {};
+  const bool stands = twist.forward_mps == 0 && twist.turn_radps == 0;
+  const bool rolls = told_.forward_mmps != 0 || told_.turn_mradps != 0;
+  if (stands && rolls && proof_ == Proof::none && talks(now)) {  // Not only in the next cycle.
+    told_ = {};
+    co_await send(encode(told_));
+  }
   if (way_.refuses(twist)) co_return make_error_code(errc::io_error);
-  if (!talks(now) || released_) co_return make_error_code(errc::not_connected);
-  if (held()) co_return make_error_code(errc::operation_not_permitted);
-  if (!drives(now)) co_return make_error_code(errc::not_connected);
+  if (const auto why = disobeys(now)) co_return why;
   wanted_ = twist;
   wanted_at_ = now;
   co_return hal::Result<void>{};
+}
+
+boost::system::error_code AgilexDrive::disobeys(hal::Time now) const {
+  if (!talks(now) || released_) return make_error_code(errc::not_connected);
+  if (held()) return make_error_code(errc::operation_not_permitted);
+  return drives(now) ? boost::system::error_code{} : make_error_code(errc::not_connected);
+}
+
+hal::DriveStatus AgilexDrive::status() const {
+  const hal::Time now = clock_.now();
+  const bool known = within(heard_.system_at, now, kStateSilence);
+  hal::DriveStatus status;
+  status.reported_at = heard_.motion_at;
+  status.silent = !talks(now);
+  status.held = held();
+  status.estop_pressed = known && heard_.system->vehicle == agilex::VehicleState::estop_pressed;
+  status.remote_control = known && heard_.system->mode == agilex::ControlMode::rc;
+  status.commanded_by_others = within(heard_.foreign_at, now, kRemembered);
+  return status;
+}
+
+hal::Task<hal::Result<hal::Duration>> AgilexDrive::prove_timeout() {
+  struct Guard {  // Also when cancelled: the next command makes it stand.
+    Proof& proof;
+    ~Guard() { proof = Proof::none; }
+  };
+  if (const auto why = disobeys(clock_.now())) co_return why;
+  const Guard guard{proof_};
+  auto took = co_await creep_then_say_nothing();
+  proof_ = Proof::none;
+  const hal::Twist stand;
+  (void)co_await command(stand);
+  co_return took;
+}
+
+hal::Task<hal::Result<hal::Duration>> AgilexDrive::creep_then_say_nothing() {
+  proof_ = Proof::creep;
+  const hal::Time began = clock_.now();
+  while (moves_.forward_mmps < kCreeps_mmps) {
+    if (clock_.now() - began > kCreepMax) co_return make_error_code(errc::io_error);
+    co_await clock_.sleep_for(kCycle);
+    if (const auto why = disobeys(clock_.now())) co_return why;
+  }
+  proof_ = Proof::nothing;
+  const hal::Time silent = clock_.now();
+  int fastest_mmps = 0;
+  while (moves_.forward_mmps > kStands_mmps) {
+    fastest_mmps = std::max<int>(fastest_mmps, moves_.forward_mmps);
+    const hal::Duration waited = clock_.now() - silent;
+    const bool brakes = waited <= kHalfMax || 2 * moves_.forward_mmps <= fastest_mmps;
+    if (!brakes || waited > kStandsMax) co_return make_error_code(errc::timed_out);
+    co_await clock_.sleep_for(kCycle);
+    if (const auto why = disobeys(clock_.now())) co_return why;
+  }
+  co_return clock_.now() - silent;
 }
 
 hal::Task<hal::Result<hal::WheelTravel>> AgilexDrive::next_travel() {
@@ -417,6 +494,7 @@ void AgilexDrive::add_base_troubles(std::vector<Trouble>& all, hal::Time now) co
     for (const Fault* fault : faults_set(agilex::motor_faults(), heard_.motor_bits[i]))
       all.push_back({fault, "motor " + std::to_string(i + 1)});
   if (way_.blocked()) all.push_back(trouble(kBlocked));
+  if (within(heard_.foreign_at, now, kRemembered)) all.push_back(trouble(kForeign));
 }
 
 void AgilexDrive::add_report_troubles(std::vector<Trouble>& all, hal::Time now) const {

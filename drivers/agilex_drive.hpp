@@ -19,7 +19,7 @@ namespace drivers {
 
 // Takes command of the base by itself, again after every loss, and never against a transmitter or
 // an e-stop. The base is told to stand unless commands come.
-class AgilexDrive final : public hal::Drive, public Device {
+class AgilexDrive final : public hal::GuardedDrive, public Device {
  public:
   enum class Model { scout2, scout_mini, bunker };
   struct Config {
@@ -42,6 +42,11 @@ class AgilexDrive final : public hal::Drive, public Device {
   // Waits for the base, however long it is silent: what it rolled meanwhile is in the next report,
   // unless it was switched off or given away in the meantime. One caller at a time.
   hal::Task<hal::Result<hal::WheelTravel>> next_travel() override;
+
+  hal::DriveStatus status() const override;
+  // The base cannot be asked for its time-out (500 ms by its manual): it is made to creep at 2
+  // cm/s, then told nothing, and must report that it stands.
+  hal::Task<hal::Result<hal::Duration>> prove_timeout() override;
 
   std::string_view model() const override;
   hal::Task<void> run() override;
@@ -68,7 +73,10 @@ class AgilexDrive final : public hal::Drive, public Device {
     int v1_frames{}, other_frames{};
     hal::Time other_at{}, v1_at{};
     std::uint32_t other_id{};
+    hal::Time foreign_at{};  // Somebody else's command.
   };
+  // What the proof of the time-out tells the base instead of commands.
+  enum class Proof : std::uint8_t { none, creep, nothing };
 
   hal::Task<void> listen();
   hal::Task<void> keep();
@@ -79,12 +87,15 @@ class AgilexDrive final : public hal::Drive, public Device {
   void on(const agilex::Odometry& odometry, hal::Time at);
   void on(const agilex::MotorSlow& motor, hal::Time at);
   void on(const agilex::Version& version, hal::Time at);
+  void on(const agilex::MotionCommand& foreign, hal::Time at);
   void on_silence_over();
   std::optional<hal::CanFrame> next_frame(hal::Time now);
   std::optional<hal::CanFrame> take_command(hal::Time now);
   agilex::MotionCommand motion(hal::Time now);
   void watch_sides(hal::Time now);
   hal::Task<void> send(const hal::CanFrame& frame);
+  hal::Task<hal::Result<hal::Duration>> creep_then_say_nothing();
+  boost::system::error_code disobeys(hal::Time now) const;
 
   bool talks(hal::Time now) const;   // Reports come as they should.
   bool drives(hal::Time now) const;  // And the base obeys us.
@@ -110,6 +121,7 @@ class AgilexDrive final : public hal::Drive, public Device {
   hal::Twist wanted_;
   hal::Time wanted_at_{};
   agilex::MotionCommand told_;
+  Proof proof_ = Proof::none;
   BlockedWay way_;
   SideWatch left_, right_;
   agilex::MotionState moves_;

@@ -184,7 +184,7 @@ hal::Task<void> Cia402Drive::cycle() {
   for (hal::Time next = clock_.now();; next = std::max(next + kCycle, clock_.now())) {
     co_await clock_.sleep_until(next);
     const hal::Time now = clock_.now();
-    if (now >= next_heartbeat_) {
+    if (now >= next_heartbeat_ && !heart_stopped_) {
       next_heartbeat_ = now + kMasterHeartbeat;
       co_await send(canopen::Heartbeat{config_.master, canopen::NodeState::operational});
     }
@@ -223,7 +223,8 @@ void Cia402Drive::decide(hal::Time now) {
       node->replied.notify();
     }
   const bool both = enabled(left_, now) && enabled(right_, now);
-  if (moving_allowed_ && !both) stopping_ = true;
+  // In the proof each must stop by itself.
+  if (moving_allowed_ && !both && !heart_stopped_) stopping_ = true;
   if (stopping_) {
     const auto rests = [&](const Node& node) {
       const auto state = state_of(node);
@@ -311,6 +312,8 @@ hal::Task<hal::Result<void>> Cia402Drive::command(hal::Twist twist) {
   if (!std::isfinite(twist.forward_mps) || !std::isfinite(twist.turn_radps))
     co_return make_error_code(errc::invalid_argument);
   wanted_ = {};
+  const bool stands = twist.forward_mps == 0 && twist.turn_radps == 0;
+  if (stands && (told_.forward_mps != 0 || told_.turn_radps != 0)) co_await stand_now();
   if (way_.refuses(twist)) co_return make_error_code(errc::io_error);
   if (released_) co_return make_error_code(errc::not_connected);
   if (!moving_allowed_) {
@@ -321,6 +324,55 @@ hal::Task<hal::Result<void>> Cia402Drive::command(hal::Twist twist) {
   wanted_ = twist;
   wanted_at_ = clock_.now();
   co_return hal::Result<void>{};
+}
+
+// Not only in the next cycle.
+hal::Task<void> Cia402Drive::stand_now() {
+  told_ = {};
+  for (Node* node : {&left_, &right_})
+    if (node->configured) co_await send(target(*node, clock_.now()));
+}
+
+hal::DriveStatus Cia402Drive::status() const {
+  const hal::Time now = clock_.now();
+  hal::DriveStatus status;
+  status.reported_at = std::min(left_.heard.status_at, right_.heard.status_at);
+  status.silent = !reports(left_, now) || !reports(right_, now);
+  status.held = !moving_allowed_;
+  return status;
+}
+
+hal::Task<hal::Result<hal::Duration>> Cia402Drive::prove_timeout() {
+  struct Guard {  // Also when cancelled.
+    bool& stopped;
+    ~Guard() { stopped = false; }
+  };
+  if (!moving_allowed_) co_return make_error_code(errc::not_connected);
+  const Guard guard{heart_stopped_};
+  const auto took = co_await stop_our_heart();
+  heart_stopped_ = false;
+  if (!took) co_return took;
+  const hal::Time late = clock_.now() + kProofUpMax;
+  while (!moving_allowed_) {
+    if (clock_.now() >= late) co_return make_error_code(errc::not_connected);
+    co_await clock_.sleep_for(kCycle);
+  }
+  co_return took;
+}
+
+hal::Task<hal::Result<hal::Duration>> Cia402Drive::stop_our_heart() {
+  wanted_ = {};
+  heart_stopped_ = true;
+  const hal::Time silent = clock_.now();
+  const auto left_by_itself = [this] {
+    const hal::Time now = clock_.now();
+    return !enabled(left_, now) && !enabled(right_, now);
+  };
+  while (!left_by_itself()) {
+    if (clock_.now() - silent > kProofMax) co_return make_error_code(errc::timed_out);
+    co_await clock_.sleep_for(kCycle);
+  }
+  co_return clock_.now() - silent;
 }
 
 hal::Task<hal::Result<hal::WheelTravel>> Cia402Drive::next_travel() {

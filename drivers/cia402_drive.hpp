@@ -28,7 +28,7 @@ namespace drivers {
 // both are enabled and report: when one drops out, the other is stopped in the same cycle of 20 ms.
 // The drives themselves stop when this program's heartbeat is missing for 300 ms. A drive that was
 // switched off is configured anew; a fault is reset a few times, then left for a person.
-class Cia402Drive final : public hal::Drive, public Device {
+class Cia402Drive final : public hal::GuardedDrive, public Device {
  public:
   struct Side {
     std::uint8_t node{};  // 1..126
@@ -63,6 +63,13 @@ class Cia402Drive final : public hal::Drive, public Device {
   hal::Task<hal::Result<void>> command(hal::Twist twist) override;
   // Waits for both drives, however long one is silent. One caller at a time.
   hal::Task<hal::Result<hal::WheelTravel>> next_travel() override;
+
+  // An open STO input and a fault look alike: either is `held`. So does enabling, at the start.
+  hal::DriveStatus status() const override;
+  // The time-out is the drives' watch over our heartbeat (0x1016, read back after it was set, with
+  // quick stop as what follows). Here our heart stops while both stand enabled, and both must leave
+  // that state by themselves; then they are brought up anew. Nothing moves.
+  hal::Task<hal::Result<hal::Duration>> prove_timeout() override;
 
   std::string_view model() const override { return "cia402"; }
   hal::Task<void> run() override;
@@ -159,6 +166,8 @@ class Cia402Drive final : public hal::Drive, public Device {
   double target_mps(const Node& node) const;
   canopen::Pdo target(Node& node, hal::Time now);
   hal::Task<void> send(const canopen::Message& message);
+  hal::Task<void> stand_now();
+  hal::Task<hal::Result<hal::Duration>> stop_our_heart();
 
   std::optional<cia402::State> state_of(const Node& node) const;
   bool beats(const Node& node, hal::Time now) const;
@@ -189,6 +198,7 @@ class Cia402Drive final : public hal::Drive, public Device {
   hal::Twist told_;
   BlockedWay way_;
   bool moving_allowed_ = false, stopping_ = false;
+  bool heart_stopped_ = false;  // Of ours, for the proof of the drives' time-out.
 
   hal::Time next_heartbeat_{};
   std::bitset<128> heard_nodes_;

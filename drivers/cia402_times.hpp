@@ -27,6 +27,10 @@ constexpr hal::Duration kResetHold = std::chrono::milliseconds(100);
 constexpr int kResetsMax = 3;  // Until the drive restarts.
 constexpr hal::Duration kWellAgain =
     std::chrono::seconds(10);  // Enabled for so long: resets are counted anew.
+// The proof of the drives' own time-out: our heartbeat's limit, a report, and some cycles; and
+// until both are enabled again.
+constexpr hal::Duration kProofMax = std::chrono::milliseconds(500),
+                        kProofUpMax = std::chrono::seconds(10);
 constexpr hal::Duration kStanding = std::chrono::milliseconds(200);
 constexpr hal::Duration kRemembered =
     std::chrono::seconds(2);   // Troubles that come and go are shown for so long.

@@ -241,6 +241,7 @@ hal::Task<void> PowerIo::read_inputs() {
 }
 
 void PowerIo::take_inputs(waveshare::Channels inputs, hal::Time now) {
+  inputs_taken_ = true;
   const auto at = [&](int channel) { return inputs.test(static_cast<std::size_t>(channel)); };
   if (config_.estop)
     estop_.update(at(config_.estop->normally_closed), at(config_.estop->normally_open), now);
@@ -301,14 +302,24 @@ hal::Task<void> PowerIo::watch_safety() {
 }
 
 hal::Task<hal::Result<hal::SafetyInputs>> PowerIo::inputs() {
-  const hal::Time now = clock_.now();
+  co_return read_inputs_at(clock_.now());
+}
+
+std::optional<hal::SafetyInputs> PowerIo::inputs_now() const {
+  if (board_peer_.link == nullptr && safety_peer_.link == nullptr) return std::nullopt;
+  if (board_peer_.link != nullptr && !inputs_taken_) return std::nullopt;
+  if (safety_peer_.link != nullptr && !safety_) return std::nullopt;
+  return read_inputs_at(clock_.now());
+}
+
+hal::SafetyInputs PowerIo::read_inputs_at(hal::Time now) const {
   hal::SafetyInputs inputs;
   inputs.stamp = std::max(board_peer_.heard_at, safety_peer_.heard_at);
   inputs.estop_pressed = estop_pressed(now);
   inputs.bumper_pressed = bumper_pressed(now);
   inputs.reset_pressed =
       fresh(board_peer_, now) && reset_at_ != hal::Time{} && now - reset_at_ <= kResetShown;
-  co_return inputs;
+  return inputs;
 }
 
 bool PowerIo::estop_pressed(hal::Time now) const {

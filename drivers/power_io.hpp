@@ -51,6 +51,9 @@ class PowerIo final : public hal::PowerIo, public Device {
   // ever; without any bumper it is released. reset_pressed holds for 500 ms after somebody pressed
   // the button for 0.1 to 3 s and let it go.
   hal::Task<hal::Result<hal::SafetyInputs>> inputs() override;
+  // The same at once; nothing for a robot without safety inputs, and until all that it has were
+  // heard for the first time. Does not allocate.
+  std::optional<hal::SafetyInputs> inputs_now() const;
   // channel: 0 to 7; hold: 0.1 s to 3276.7 s, rounded up to tenths. Fails with
   // errc::argument_out_of_domain beyond these, errc::not_connected without a board that answers.
   hal::Task<hal::Result<void>> set_relay(int channel, bool on, hal::Duration hold) override;
@@ -87,6 +90,7 @@ class PowerIo final : public hal::PowerIo, public Device {
   hal::Task<hal::Result<T>> ask(Peer& peer, hal::Task<hal::Result<T>> request, hal::Duration late);
 
   bool fresh(const Peer& peer, hal::Time now) const;
+  hal::SafetyInputs read_inputs_at(hal::Time now) const;
   bool estop_pressed(hal::Time now) const;
   bool bumper_pressed(hal::Time now) const;
   void add_peer_troubles(std::vector<Trouble>& all, const Peer& peer, hal::Time now) const;
@@ -109,7 +113,8 @@ class PowerIo final : public hal::PowerIo, public Device {
   safety::ContactPair estop_, bumper_;
   safety::ResetButton reset_;
   hal::Time reset_at_{};
-  bool reset_stuck_ = false, board_ready_ = false, other_board_ = false, mode_refused_ = false;
+  bool inputs_taken_ = false, reset_stuck_ = false, board_ready_ = false, other_board_ = false,
+       mode_refused_ = false;
   struct Relay {
     hal::Time set_at{}, off_at{};
     bool strays = false;  // Does not stand as it was set.

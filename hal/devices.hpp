@@ -19,6 +19,30 @@ class Drive {
   virtual Task<Result<WheelTravel>> next_travel() = 0;
 };
 
+// What a drive says of itself. Until it says otherwise it counts as silent and held.
+struct DriveStatus {
+  Time reported_at{};  // Its latest report of how it moves; 0: none.
+  bool silent = true;  // It does not report as it should.
+  bool held = true;    // An e-stop, a remote control or a fault of its own: it refuses commands.
+  // What it says for sure.
+  bool estop_pressed{};
+  bool remote_control{};
+  bool commanded_by_others{};  // Somebody else's commands were seen on its link.
+};
+
+// A drive whose own safeguards can be looked at.
+class GuardedDrive : public Drive {
+ public:
+  // Does not wait, does not allocate.
+  virtual DriveStatus status() const = 0;
+  // Shows that the drive stops by itself when it hears no more commands, and returns after how
+  // long. The robot must stand; it may creep by up to 2 cm. Fails with errc::timed_out when the
+  // drive did not stop by itself, errc::io_error when it could not be seen to move,
+  // errc::not_connected or errc::operation_not_permitted when it does not obey. Commands given
+  // meanwhile are not carried out. Cancelling it makes the drive stand.
+  virtual Task<Result<Duration>> prove_timeout() = 0;
+};
+
 class Imu {
  public:
   virtual ~Imu() = default;

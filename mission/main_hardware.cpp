@@ -1,6 +1,7 @@
 #include "mission/main_hardware.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/co_spawn.hpp>
@@ -58,9 +59,11 @@ void note_run(RunRecord& record, const Prepared& prepared, const DeviceWatch& wa
 class Signals {
  public:
   Signals(asio::io_context& io, GuardedSurvey& survey)
-      : set_(io, SIGINT, SIGTERM), meant_once_(io) {
+      : set_(io, SIGINT, SIGTERM), release_(io, SIGUSR1), meant_once_(io), gate_(survey.gate()) {
+    wait_for_release();
     set_.async_wait([this, &survey](boost::system::error_code error, int number) {
       if (error) return;
+      release_.cancel();
       survey.stop(fmt::format("stopped by {}", number == SIGINT ? "SIGINT" : "SIGTERM"));
       meant_once_.expires_after(kMeantOnce);
       meant_once_.async_wait([this](boost::system::error_code over) {
@@ -70,8 +73,19 @@ class Signals {
   }
 
  private:
-  asio::signal_set set_;
+  // Only who runs the program, or root, can send it, on purpose and from this machine: as good as a
+  // key. Nothing sends it by itself.
+  void wait_for_release() {
+    release_.async_wait([this](boost::system::error_code error, int) {
+      if (error) return;
+      gate_.ask_release();
+      wait_for_release();
+    });
+  }
+
+  asio::signal_set set_, release_;
   asio::steady_timer meant_once_;
+  GatedDrive& gate_;
 };
 
 }  // namespace
@@ -79,8 +93,9 @@ class Signals {
 GuardedSurvey::GuardedSurvey(const Prepared& prepared, int threads, Config config, Parts parts)
     : config_(std::move(config)),
       parts_(parts),
-      watch_(config_.watch, parts.drivers, parts.clock),
-      drive_(parts.drivers.drive(), watch_, parts.clock),
+      watch_(watched(config_.watch), parts.drivers, parts.clock),
+      gate_(gated(prepared.config.robot), parts.clock, parts.drivers.drive()),
+      drive_(gate_, watch_, parts.clock),
       imu_(parts.drivers.imu(), watch_, parts.clock),
       gnss_(parts.drivers.gnss(), watch_, parts.clock),
       scanner_(parts.drivers, watch_, parts.clock),
@@ -89,9 +104,29 @@ GuardedSurvey::GuardedSurvey(const Prepared& prepared, int threads, Config confi
       survey_(prepared.config, prepared.site.map, prepared.tasks, threads,
               {parts.clock, devices_, parts.store, parts.progress, parts.compute}) {}
 
+DeviceWatch::Config GuardedSurvey::watched(DeviceWatch::Config config) {
+  config.held = [this] { return gate_.held_by_people(); };
+  return config;
+}
+
+GatedDrive::Config GuardedSurvey::gated(const RobotConfig& robot) {
+  GatedDrive::Config config = gate_config(robot, parts_.drivers);
+  config.tell = [this](const std::string& what) { watch_.note(what); };
+  config.how_to_release = config_.how_to_release;
+  return config;
+}
+
+// The gate commands the drive for as long as there is one.
+hal::Task<void> GuardedSurvey::run_devices() {
+  std::vector<hal::Task<void>> both;
+  both.push_back(parts_.drivers.run());
+  both.push_back(gate_.run());
+  co_await hal::together(std::move(both));
+}
+
 void GuardedSurvey::start() {
   const auto devices_ended = [this](std::exception_ptr error) { on_devices_end(error); };
-  asio::co_spawn(parts_.io, parts_.drivers.run(),
+  asio::co_spawn(parts_.io, run_devices(),
                  asio::bind_cancellation_slot(cancel_devices_.slot(), devices_ended));
   const auto run_ended = [this](std::exception_ptr error) { on_run_end(error); };
   asio::co_spawn(parts_.io, run(), asio::bind_cancellation_slot(cancel_run_.slot(), run_ended));
@@ -99,6 +134,7 @@ void GuardedSurvey::start() {
 
 hal::Task<void> GuardedSurvey::run() {
   co_await start_devices();
+  co_await arm(gate_);
   surveying_ = true;
   co_await hal::first_of(survey_.run(), watch_it());
   if (!watch_.given_up().empty()) throw std::runtime_error(watch_.given_up());
@@ -136,6 +172,7 @@ void GuardedSurvey::stop(std::string reason) {
 
 // Whatever ended it, the robot stands before the program goes on.
 void GuardedSurvey::on_run_end(std::exception_ptr error) {
+  gate_.finish();
   if (failure_.empty()) failure_ = stop_reason_.empty() ? text_of(error) : stop_reason_;
   if (!surveying_) survey_.record().end = failure_;
   asio::co_spawn(parts_.io, release_within(parts_.drivers, parts_.clock),
@@ -171,6 +208,9 @@ RunOutcome run_on_hardware(Prepared& prepared, const RunOptions& options) {
   Worker worker;
   GuardedSurvey::Config config;
   config.watch.link_troubles = [&links](std::string_view role) { return links.troubles(role); };
+  config.how_to_release =
+      fmt::format("{}run `kill -USR1 {}`",
+                  robot.power.board_link.empty() ? "" : "press its reset button or ", getpid());
   config.watch.tell = [&progress](const std::string& what) { progress.message(what); };
   GuardedSurvey guarded(prepared, options.threads, config,
                         {io, clock, drivers, store, progress, worker});

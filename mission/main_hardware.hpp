@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "mission/main_gate.hpp"
 #include "mission/main_links.hpp"
 #include "mission/main_run.hpp"
 #include "mission/main_watch.hpp"
@@ -19,6 +20,7 @@ class GuardedSurvey {
   struct Config {
     hal::Duration start_patience = std::chrono::seconds(60);  // For all devices to start.
     DeviceWatch::Config watch;
+    std::string how_to_release = "press the reset button";
   };
   struct Parts {
     boost::asio::io_context& io;
@@ -40,11 +42,15 @@ class GuardedSurvey {
 
   Survey& survey() { return survey_; }
   DeviceWatch& watch() { return watch_; }
+  GatedDrive& gate() { return gate_; }
   const std::string& failure() const { return failure_; }  // Why it ended early; else empty.
   const std::string& stop_reason() const { return stop_reason_; }  // As given to stop().
 
  private:
+  DeviceWatch::Config watched(DeviceWatch::Config config);
+  GatedDrive::Config gated(const RobotConfig& robot);
   hal::Task<void> run();
+  hal::Task<void> run_devices();
   hal::Task<void> start_devices();
   hal::Task<void> watch_it();
   void on_run_end(std::exception_ptr error);
@@ -54,6 +60,7 @@ class GuardedSurvey {
   const Config config_;
   Parts parts_;
   DeviceWatch watch_;
+  GatedDrive gate_;
   WatchedDrive drive_;
   WatchedImu imu_;
   WatchedGnss gnss_;
@@ -67,9 +74,9 @@ class GuardedSurvey {
 };
 
 // Runs the whole mission on the devices that the robot file's links lead to, and writes its
-// products. SIGINT and SIGTERM stop it; one more than a second later ends the program at once (the
-// drive then stands by its own time-out). Throws boost::system::system_error when the folder cannot
-// be written.
+// products. SIGUSR1 is a person's release of a robot that was stopped. SIGINT and SIGTERM stop it;
+// one more than a second later ends the program at once (the drive then stands by its own
+// time-out). Throws boost::system::system_error when the folder cannot be written.
 RunOutcome run_on_hardware(Prepared& prepared, const RunOptions& options);
 
 }  // namespace mission

@@ -175,7 +175,11 @@ void RobotDrivers::add_power(const RobotConfig& config, const Links& links) {
   for (const std::string* one :
        {&config.power.battery_link, &config.power.board_link, &config.power.safety_link})
     if (!one->empty()) link += (link.empty() ? "" : ", ") + *one;
-  own("power", link, std::make_unique<drivers::PowerIo>(settings, clock_, power));
+  power_ = &own("power", link, std::make_unique<drivers::PowerIo>(settings, clock_, power));
+}
+
+std::optional<hal::SafetyInputs> RobotDrivers::safety_inputs() const {
+  return power_ == nullptr ? std::nullopt : power_->inputs_now();
 }
 
 hal::Task<void> RobotDrivers::run() {

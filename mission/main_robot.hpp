@@ -44,10 +44,13 @@ class RobotDrivers {
                hal::Clock& clock, const Links& links);
   ~RobotDrivers();
 
-  hal::Drive& drive() { return *drive_; }
+  hal::GuardedDrive& drive() { return *drive_; }
   hal::Imu& imu() { return *imu_; }
   hal::Gnss& gnss() { return *gnss_; }
   hal::Scanner& scanner() { return *scanner_; }
+
+  // See drivers::PowerIo::inputs_now(); nothing where the robot has none.
+  std::optional<hal::SafetyInputs> safety_inputs() const;
 
   const std::vector<NamedDevice>& devices() const { return devices_; }
 
@@ -81,7 +84,8 @@ class RobotDrivers {
   hal::Clock& clock_;
   std::vector<std::unique_ptr<drivers::Device>> owned_;
   std::vector<NamedDevice> devices_;
-  hal::Drive* drive_{};
+  hal::GuardedDrive* drive_{};
+  drivers::PowerIo* power_{};
   std::function<hal::Task<void>()> release_drive_;
   hal::Imu* imu_{};
   hal::Gnss* gnss_{};

@@ -36,10 +36,11 @@ void load_world(Prepared& prepared, const MissionCheck& check, WorldUse use,
 
 constexpr hal::Duration kStartPatience = std::chrono::seconds(60);
 
-hal::Task<void> start_and_survey(RobotDrivers& drivers, Survey& survey) {
+hal::Task<void> start_and_survey(RobotDrivers& drivers, GatedDrive& gate, Survey& survey) {
   const hal::Result<void> started = co_await drivers.started(kStartPatience);
   if (started.has_error())
     throw std::runtime_error("not every device started: " + drivers.not_running());
+  co_await arm(gate);
   co_await survey.run();
 }
 
@@ -56,7 +57,8 @@ std::string run_survey(SimBackend& backend, Survey& survey,
       failure = e.what();
     }
   };
-  boost::asio::co_spawn(backend.io(), start_and_survey(backend.drivers(), survey), on_end);
+  boost::asio::co_spawn(backend.io(), start_and_survey(backend.drivers(), backend.gate(), survey),
+                        on_end);
   const auto done = [&] {
     if (watch) watch(backend);
     return ended;
@@ -137,6 +139,7 @@ RunOutcome run_in_simulation(Prepared& prepared, const RunOptions& options) {
   record.notes.insert(record.notes.begin(), prepared.notes.begin(), prepared.notes.end());
   std::string failure = run_survey(backend, survey, options.watch);
   progress.finish();
+  record.notes.insert(record.notes.end(), backend.events().begin(), backend.events().end());
   record.truth = backend.judge(record, survey.model(), prepared.tasks.tasks, options.judge_cells);
   save_products(store, survey);
   return {std::move(record), store.report_path(), std::move(failure), false};

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "hal/angles.hpp"
+#include "hal/together.hpp"
 #include "mission/files.hpp"
 #include "nav/polygons.hpp"
 #include "nav/raster.hpp"
@@ -26,6 +27,8 @@ constexpr double radians(double degrees) {
 constexpr double kGroundSampleM = 4.0;
 // Ways are looked for in steps of this: a gap that leaves the robot this much play is a way.
 constexpr double kReachCellM = 0.25;
+
+constexpr std::size_t kEventsMax = 200;
 
 sim::ScannerModel scanner_model(const RobotConfig& robot) {
   const ScannerConfig& scanner = robot.scanner;
@@ -89,6 +92,15 @@ std::vector<Eigen::Vector3d> ground_samples(const std::vector<AreaTask>& tasks) 
   return samples;
 }
 
+GatedDrive::Config sim_gate_config(const RobotConfig& robot, const RobotDrivers& drivers,
+                                   std::vector<std::string>& events) {
+  GatedDrive::Config config = gate_config(robot, drivers);
+  config.tell = [&events](const std::string& what) {
+    if (events.size() < kEventsMax) events.push_back(what);  // Later ones are not kept.
+  };
+  return config;
+}
+
 }  // namespace
 
 SimSite load_sim_site(const std::filesystem::path& model_file) {
@@ -142,18 +154,28 @@ SimBackend::SimBackend(const MissionConfig& config, const SiteTasks& tasks, SimS
       threads_(threads),
       true_site_(config, tasks, std::move(site), threads),
       robot_(config.robot, kSimAnchor, config.seed, threads, true_site_.world(), clock_),
+      gate_(sim_gate_config(config.robot, robot_.drivers(), events_), clock_,
+            robot_.drivers().drive()),
       scanner_(robot_.drivers().scanner(), true_site_.world(), clock_),
       placement_(true_site_.world(), clock_),
-      devices_{robot_.drivers().drive(),
-               robot_.drivers().imu(),
-               robot_.drivers().gnss(),
-               scanner_,
-               placement_,
-               [this] { return robot_.drivers().complaints(); }} {}
+      devices_{gate_,      robot_.drivers().imu(),         robot_.drivers().gnss(), scanner_,
+               placement_, [this] { return complaints(); }} {}
+
+std::string SimBackend::complaints() {
+  const std::string gate = gate_.why(), all = robot_.drivers().complaints();
+  return gate + (gate.empty() || all.empty() ? "" : "; ") + all;
+}
+
+hal::Task<void> SimBackend::run_robot() {
+  std::vector<hal::Task<void>> both;
+  both.push_back(robot_.run());
+  both.push_back(gate_.run());
+  co_await hal::together(std::move(both));
+}
 
 bool SimBackend::run(const std::function<bool()>& done) {
   if (!started_)
-    boost::asio::co_spawn(io_, robot_.run(), [this](std::exception_ptr error) {
+    boost::asio::co_spawn(io_, run_robot(), [this](std::exception_ptr error) {
       try {
         if (error) std::rethrow_exception(error);
         failure_ = "the robot's devices ended by themselves";

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "mission/config.hpp"
+#include "mission/main_gate.hpp"
 #include "mission/main_units.hpp"
 #include "mission/plan.hpp"
 #include "mission/record.hpp"
@@ -67,6 +68,9 @@ class SimBackend {
   RobotDrivers& drivers() { return robot_.drivers(); }
   RobotUnits& units() { return robot_.units(); }
   SimulatedRobot& robot() { return robot_; }
+  GatedDrive& gate() { return gate_; }
+  // What stopped and released the robot, in words.
+  const std::vector<std::string>& events() const { return events_; }
   // Starts units and drivers, and runs until done() holds. False when they ended by themselves, or
   // nothing is left to run: failure() may say why.
   bool run(const std::function<bool()>& done);
@@ -79,6 +83,8 @@ class SimBackend {
               const std::filesystem::path& cells_file) const;
 
  private:
+  hal::Task<void> run_robot();
+  std::string complaints();
   void judge_poses(RunRecord& record, Truth& truth) const;
   void judge_surface(const RunRecord& record, const SiteModel& model,
                      const std::vector<Eigen::Vector3d>& positions, Truth& truth) const;
@@ -93,6 +99,8 @@ class SimBackend {
   boost::asio::io_context io_{1};
   sim::SimClock clock_{io_};
   SimulatedRobot robot_;
+  std::vector<std::string> events_;
+  GatedDrive gate_;
   sim::WitnessedScanner scanner_;
   sim::SimPlacement placement_;
   hal::Devices devices_;

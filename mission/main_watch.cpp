@@ -36,6 +36,7 @@ DeviceWatch::DeviceWatch(Config config, const RobotDrivers& drivers, hal::Clock&
 hal::Task<void> DeviceWatch::run() {
   for (;;) {
     look();
+    if (config_.held && config_.held()) lost_at_ = clock_.now();
     if (!well_ && clock_.now() - lost_at_ > config_.patience) break;
     co_await clock_.sleep_for(kLook);
   }
@@ -114,6 +115,7 @@ hal::Task<hal::Result<void>> WatchedDrive::command(hal::Twist twist) {
     (void)co_await drive_.command(stand);  // Gone or not.
   }
   co_await watch_.until_well();
+  co_await drive_.until_released();
   co_return hal::Result<void>{};
 }
 

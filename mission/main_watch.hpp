@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "hal/wake.hpp"
+#include "mission/gated_drive.hpp"
 #include "mission/main_robot.hpp"
 
 namespace mission {
@@ -19,6 +20,7 @@ class DeviceWatch {
     // What is wrong with the link of a role (see NamedDevice); it explains what is wrong behind it.
     std::function<std::vector<drivers::Trouble>(std::string_view role)> link_troubles;
     std::function<void(const std::string&)> tell;  // What happens, as it happens.
+    std::function<bool()> held;  // A person holds the robot: patience begins when they let it go.
   };
   // The drivers and the clock must outlive it.
   DeviceWatch(Config config, const RobotDrivers& drivers, hal::Clock& clock);
@@ -57,15 +59,16 @@ class DeviceWatch {
 // lost: it waits until all are well again, or is cancelled when the watch gives up.
 class WatchedDrive final : public hal::Drive {
  public:
-  WatchedDrive(hal::Drive& drive, DeviceWatch& watch, hal::Clock& clock)
+  WatchedDrive(GatedDrive& drive, DeviceWatch& watch, hal::Clock& clock)
       : drive_(drive), watch_(watch), clock_(clock) {}
-  // After a wait the command counts as given and the robot stands: whoever drives looks again from
-  // where it is now.
+  // Waits, too, for a person to release a robot that was stopped, however long that takes. After a
+  // wait the command counts as given and the robot stands: whoever drives looks again from where it
+  // is now.
   hal::Task<hal::Result<void>> command(hal::Twist twist) override;
   hal::Task<hal::Result<hal::WheelTravel>> next_travel() override;
 
  private:
-  hal::Drive& drive_;
+  GatedDrive& drive_;
   DeviceWatch& watch_;
   hal::Clock& clock_;
 };

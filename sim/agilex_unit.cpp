@@ -35,6 +35,7 @@ AgilexUnit::AgilexUnit(const Config& config, World& world, Battery* battery, hal
       clock_(clock),
       faults_(faults),
       bus_(bus, clock, faults),
+      stops_by_itself_(config.stops_by_itself),
       left_mm_(config.odometry_mm),
       right_mm_(config.odometry_mm) {}
 
@@ -79,7 +80,8 @@ void AgilexUnit::obey(const MotionCommand& command) {
                  config_.limits.turn_mradps);
   commanded_at_ = clock_.now();
   world_.advance(commanded_at_);
-  const bool free = world_.command({forward / 1000, turn / 1000}).has_value();
+  obeyed_ = {forward / 1000, turn / 1000};
+  const bool free = world_.command(obeyed_).has_value();
   if (free)
     stalled_at_ = hal::Time::max();
   else
@@ -136,7 +138,12 @@ void AgilexUnit::roll(hal::Time now) {
   was_off_ = off;
   world_.advance(now);
   if (battery_ != nullptr) battery_->update(now);
-  if (commanded_at_ != hal::Time{} && now - commanded_at_ > kCommandMax) stop();
+  if (commanded_at_ != hal::Time{} && now - commanded_at_ > kCommandMax) {
+    if (stops_by_itself_)
+      stop();
+    else
+      (void)world_.command(obeyed_);
+  }
   const hal::WheelTravel travel = world_.take_travel();
   left_mm_ += travel.left_m * 1000 * faults_.wrong_factor();
   right_mm_ += travel.right_m * 1000 * faults_.wrong_factor();

@@ -25,6 +25,7 @@ class AgilexUnit {
     hal::Duration motor_slow_period = std::chrono::milliseconds(20);  // A Tracer's: 100 ms.
     double wheel_radius_m = 0.165;
     std::int32_t odometry_mm = 0;  // Both counters at the start.
+    bool stops_by_itself = true;   // 500 ms after the last command; false: a defective base.
   };
 
   // The battery may be null: then 26.4 V for ever.
@@ -37,6 +38,7 @@ class AgilexUnit {
   void press_estop(bool pressed);
   void switch_transmitter(bool commands);
   void set_exception(bool exception) { exception_ = exception; }
+  void set_stops_by_itself(bool stops) { stops_by_itself_ = stops; }
   void set_fault_bits(std::uint16_t system, std::uint8_t motor) {
     fault_bits_ = system;
     motor_bits_ = motor;
@@ -70,8 +72,9 @@ class AgilexUnit {
   bool estop_ = false, exception_ = false;
   std::uint16_t fault_bits_ = 0;
   std::uint8_t motor_bits_ = 0, count_ = 0;
-  bool was_off_ = false;
+  bool was_off_ = false, stops_by_itself_;
   double left_mm_, right_mm_;
+  hal::Twist obeyed_;
   hal::Time commanded_at_{}, stalled_at_ = hal::Time::max();
 };
 

@@ -82,7 +82,7 @@ hal::Task<void> Cia402Node::live() {
       enter(State::switch_on_disabled);
     if (stalled_ && now - stalled_at_ > kStalledMax) fail(kBlocked);
     const std::uint32_t watch = object(0x1016, 1) & 0xFFFF;
-    if (watch != 0 && hears_master_ && now - master_at_ > watch * 1ms) {
+    if (config_.watches_master && watch != 0 && hears_master_ && now - master_at_ > watch * 1ms) {
       hears_master_ = false;
       error_code_ = kMasterLost;
       error_untold_ = true;

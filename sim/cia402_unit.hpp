@@ -29,6 +29,7 @@ struct Cia402NodeConfig {
   std::string name = "simulated drive", software = "1.0";
   std::uint32_t device_type = 0x00020192;
   std::uint32_t modes = 0x00000185;  // PP, PV, CSP, CSV.
+  bool watches_master = true;        // False: takes 0x1016, but does nothing about it.
   // Mapped like this for ever, as some drives are; empty: as it is told.
   std::vector<drivers::canopen::PdoSetup> fixed_mapping;
 };

@@ -1,0 +1,391 @@
+// The gate between a mission and a simulated drive, judged by the frames on the bus.
+#include "mission/gated_drive.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <memory>
+
+#include "drivers/agilex_drive.hpp"
+#include "drivers/cia402_drive.hpp"
+#include "sim/agilex_unit.hpp"
+#include "sim/cia402_unit.hpp"
+#include "tests/drivers/drive_bench.hpp"
+
+namespace {
+
+using namespace drivers_test;
+using mission::Answer;
+using mission::FaultCode;
+using mission::GatedDrive;
+using mission::Mode;
+using testing::Contains;
+using testing::HasSubstr;
+namespace agilex = drivers::agilex;
+
+constexpr hal::Duration kFrameTime = 1ms;  // More than any frame takes at 500 kbit/s.
+
+// An AgileX base, safety inputs that a test sets, and what the bus carried.
+struct GatedBase : testing::Test, DriveBench {
+  struct Command {
+    hal::Time at;
+    int forward_mmps{}, turn_mradps{};
+    bool zero() const { return forward_mmps == 0 && turn_mradps == 0; }
+  };
+
+  sim::CanWire::End& host = wire.attach();
+  sim::CanWire::End& base = wire.attach();
+  sim::CanWire::End& stranger = wire.attach();
+  sim::UnitFaults faults{clock};
+  sim::AgilexUnit unit{{}, world, nullptr, clock, base, faults};
+  drivers::AgilexDrive drive{{}, clock, host};
+  std::optional<hal::SafetyInputs> safety;
+  std::vector<std::string> told;
+  std::unique_ptr<GatedDrive> gate;
+  std::vector<Command> commands;            // Ours to the base.
+  hal::Time state_at{}, motion_at{};        // When its latest reports were on the bus.
+  std::optional<agilex::SystemState> said;  // The latest.
+  std::optional<hal::Time> trouble_at;      // When a report first said what is wrong.
+  std::vector<boost::system::error_code> told_mission;
+  hal::Time planned_at{};
+  bool plans = true;
+
+  void make(mission::Boot boot = mission::Boot::clean) {
+    GatedDrive::Config config;
+    config.boot = boot;
+    config.safety = [this] { return safety; };
+    config.tell = [this](const std::string& what) { told.push_back(what); };
+    gate = std::make_unique<GatedDrive>(config, clock, drive);
+    spawn(unit.run());
+    spawn(drive.run());
+    spawn(gate->run());
+    spawn(listen());
+    wait(1s);
+  }
+  Answer start() { return run(gate->start()); }
+  void drive_off() {
+    make();
+    ASSERT_EQ(start(), Answer::released);
+    twist = {0.4, 0};
+    spawn(plan());
+    wait(2s);
+    ASSERT_GT(world.rolling().forward_mps, 0.39);
+  }
+  void release() {
+    gate->ask_release();
+    wait(4s);
+  }
+
+  hal::Task<void> plan() {
+    for (;;) {
+      if (plans) {
+        planned_at = clock.now();
+        const auto answer = co_await gate->command(twist);
+        told_mission.push_back(answer ? boost::system::error_code{} : answer.error());
+      }
+      co_await clock.sleep_for(50ms);
+    }
+  }
+  hal::Task<void> listen() {
+    sim::CanWire::End& tap = wire.attach();
+    for (;;) {
+      const auto received = co_await tap.receive();
+      if (received) hear(agilex::decode(received->frame, agilex::Dialect::v2), received->stamp);
+    }
+  }
+  void hear(const agilex::Message& message, hal::Time at) {
+    if (const auto* command = std::get_if<agilex::MotionCommand>(&message))
+      commands.push_back({at, command->forward_mmps, command->turn_mradps});
+    if (std::holds_alternative<agilex::MotionState>(message)) motion_at = at;
+    const auto* state = std::get_if<agilex::SystemState>(&message);
+    if (state == nullptr) return;
+    const bool wrong =
+        state->vehicle != agilex::VehicleState::normal || state->mode == agilex::ControlMode::rc;
+    if (wrong && !trouble_at) trouble_at = at;
+    said = *state;
+  }
+  hal::Task<void> send_as_stranger() {
+    (void)co_await stranger.send(agilex::encode(agilex::MotionCommand{.forward_mmps = 300}),
+                                 clock.now() + 10ms);
+  }
+  // The first zero at or after that time, and whether all since are zeros.
+  std::optional<hal::Time> zero_after(hal::Time from) const {
+    for (const Command& command : commands)
+      if (command.at >= from && command.zero()) return command.at;
+    return std::nullopt;
+  }
+  int moving_after(hal::Time from) const {
+    return static_cast<int>(std::ranges::count_if(
+        commands, [&](const Command& each) { return each.at > from && !each.zero(); }));
+  }
+};
+
+// --- Every cause, from when the program could know of it to the frame.
+
+struct StopCase {
+  const char* name;
+  std::function<void(GatedBase&)> begins, ends;
+  // When it was known; the time when it began unless given.
+  std::function<hal::Time(GatedBase&)> known;
+  bool latches = true;
+};
+hal::Time by_report(GatedBase& rig) {
+  return rig.trouble_at.value();
+}
+void press(GatedBase& rig, bool estop, bool bumper) {
+  hal::SafetyInputs inputs;
+  inputs.estop_pressed = estop;
+  inputs.bumper_pressed = bumper;
+  rig.safety = inputs;
+}
+
+const std::vector<StopCase>& stop_cases() {
+  static const std::vector<StopCase> cases{
+      {"EstopInput",
+       [](GatedBase& rig) { press(rig, true, false); },
+       [](GatedBase& rig) { press(rig, false, false); },
+       {}},
+      {"BumperInput",
+       [](GatedBase& rig) { press(rig, false, true); },
+       [](GatedBase& rig) { press(rig, false, false); },
+       {}},
+      {"EstopOfTheBase", [](GatedBase& rig) { rig.unit.press_estop(true); },
+       [](GatedBase& rig) { rig.unit.press_estop(false); }, by_report},
+      {"RemoteControl", [](GatedBase& rig) { rig.unit.switch_transmitter(true); },
+       [](GatedBase& rig) { rig.unit.switch_transmitter(false); }, by_report},
+      {"SomebodyElsesCommand",
+       [](GatedBase& rig) { rig.spawn(rig.send_as_stranger()); },
+       [](GatedBase&) {},
+       {}},
+      {"APersonsHold", [](GatedBase& rig) { rig.gate->ask_hold(); }, [](GatedBase&) {}, {}},
+      {"SilentDrive", [](GatedBase& rig) { rig.faults.set(sim::parse_unit_fault("off").setting); },
+       [](GatedBase& rig) { rig.faults.clear(); },
+       [](GatedBase& rig) { return rig.motion_at + 100ms; }},
+      {"SilentMission", [](GatedBase& rig) { rig.plans = false; },
+       [](GatedBase& rig) { rig.plans = true; },
+       [](GatedBase& rig) { return rig.planned_at + 500ms; }, false},
+  };
+  return cases;
+}
+
+class Stopping : public GatedBase, public testing::WithParamInterface<std::size_t> {};
+
+TEST_P(Stopping, PutsAZeroOnTheBusWithinOnePeriodAndAFrame) {
+  const StopCase& stop = stop_cases()[GetParam()];
+  drive_off();
+  wait(3ms);  // Not in step with any cycle.
+  const hal::Time began = clock.now();
+  stop.begins(*this);
+  wait(1500ms);
+  const hal::Time known = stop.known ? stop.known(*this) : began;
+  const auto zero = zero_after(known);
+  ASSERT_TRUE(zero) << "never";
+  EXPECT_LE(*zero - known, mission::kGatePeriod + kFrameTime)
+      << (*zero - known) / 1us << " us; " << testing::PrintToString(told);
+  EXPECT_EQ(moving_after(*zero), 0);
+  EXPECT_NEAR(world.rolling().forward_mps, 0, 0.01);
+
+  stop.ends(*this);
+  wait(5s);
+  if (!stop.latches) {
+    EXPECT_GT(moving_after(*zero), 0) << "it waits for a release that nobody owes";
+    return;
+  }
+  EXPECT_EQ(moving_after(*zero), 0) << "it drives on by itself";
+  release();
+  EXPECT_TRUE(gate->released()) << testing::PrintToString(told);
+  EXPECT_GT(world.rolling().forward_mps, 0.39) << testing::PrintToString(told);
+}
+
+INSTANTIATE_TEST_SUITE_P(EveryCause, Stopping, testing::Range(std::size_t{0}, stop_cases().size()),
+                         [](const auto& of) { return std::string(stop_cases()[of.param].name); });
+
+// --- Releases.
+
+TEST_F(GatedBase, IsNotReleasedWhileAStopIsThere) {
+  drive_off();
+  press(*this, true, false);
+  wait(100ms);
+  EXPECT_EQ(gate->mode(), Mode::stopped);
+  EXPECT_EQ(gate->stopped_by(), FaultCode::estop_pressed);
+  EXPECT_THAT(gate->why(), HasSubstr("F001-estop-pressed"));
+  EXPECT_THAT(gate->why(), HasSubstr("to release it, press the reset button"));
+  release();
+  EXPECT_FALSE(gate->released());
+  EXPECT_THAT(told, Contains(HasSubstr("not released: a stop is still there")));
+  press(*this, false, false);
+  wait(1s);
+  EXPECT_FALSE(gate->released()) << "the release was for an e-stop that was pressed then";
+  EXPECT_EQ(told_mission.back(), errc::operation_not_permitted);
+  release();
+  EXPECT_TRUE(gate->released());
+  EXPECT_EQ(gate->why(), "");
+}
+
+TEST_F(GatedBase, IsReleasedByTheResetInputOncePressed) {
+  drive_off();
+  press(*this, true, false);
+  wait(100ms);
+  safety->reset_pressed = true;  // Before the e-stop is out: counts for nothing, also later.
+  wait(100ms);
+  safety->estop_pressed = false;
+  wait(300ms);
+  EXPECT_FALSE(gate->released());
+  safety->reset_pressed = false;
+  wait(100ms);
+  EXPECT_FALSE(gate->released());
+  safety->reset_pressed = true;
+  wait(1s);
+  EXPECT_TRUE(gate->released());
+}
+
+TEST_F(GatedBase, DoesNotStartByItselfAfterAnEstopBefore) {
+  make();
+  unit.press_estop(true);
+  wait(300ms);
+  unit.press_estop(false);
+  wait(1s);
+  EXPECT_EQ(start(), Answer::not_enough);
+  EXPECT_EQ(world.driven_m(), 0) << "not even to prove anything";
+  release();
+  EXPECT_TRUE(gate->released());
+}
+
+TEST_F(GatedBase, WaitsForAPersonAfterAPowerCut) {
+  make(mission::Boot::power_cut);
+  EXPECT_EQ(start(), Answer::not_enough);
+  EXPECT_EQ(gate->stopped_by(), FaultCode::power_cut);
+  EXPECT_EQ(world.driven_m(), 0);
+  release();
+  EXPECT_TRUE(gate->released());
+}
+
+// --- The drive's own time-out.
+
+TEST_F(GatedBase, CreepsTwoCentimetresAtMostToProveTheTimeout) {
+  make();
+  const hal::Time began = clock.now();
+  EXPECT_EQ(start(), Answer::released);
+  EXPECT_GT(world.driven_m(), 0.002) << "it proved nothing";
+  EXPECT_LE(world.driven_m(), 0.02);
+  EXPECT_LT(clock.now() - began, 1500ms);
+  hal::Duration longest{};
+  for (std::size_t i = 1; i < commands.size(); ++i)
+    longest = std::max(longest, commands[i].at - commands[i - 1].at);
+  EXPECT_GT(longest, 490ms) << "it was never left without commands";
+}
+
+TEST_F(GatedBase, IsNotArmedWhenTheBaseDoesNotStopByItself) {
+  unit.set_stops_by_itself(false);
+  make();
+  EXPECT_EQ(start(), Answer::not_proven);
+  EXPECT_THAT(gate->proof(), HasSubstr("went on although it heard no more commands"));
+  wait(1s);
+  EXPECT_NEAR(world.rolling().forward_mps, 0, 0.01) << "it is left creeping";
+  twist = {0.4, 0};
+  spawn(plan());
+  release();
+  EXPECT_FALSE(gate->released());
+  EXPECT_LT(world.driven_m(), 0.06) << "two proofs";
+  EXPECT_NEAR(world.rolling().forward_mps, 0, 0.01);
+  EXPECT_THAT(told, Contains(HasSubstr("own time-out is not proven")));
+}
+
+TEST_F(GatedBase, EndsTheProofWhenTheEstopIsPressed) {
+  make();
+  std::optional<Answer> answer;
+  boost::asio::co_spawn(io, gate->start(), [&](std::exception_ptr problem, Answer value) {
+    if (problem) std::rethrow_exception(problem);
+    answer = value;
+  });
+  wait(203ms);
+  EXPECT_GT(world.rolling().forward_mps, 0);
+  const hal::Time pressed = clock.now();
+  press(*this, true, false);
+  wait(500ms);
+  EXPECT_EQ(answer, Answer::not_enough);
+  ASSERT_TRUE(zero_after(pressed));
+  EXPECT_LE(*zero_after(pressed) - pressed, mission::kGatePeriod + kFrameTime);
+}
+
+TEST_F(GatedBase, ProvesTheTimeoutAgainAfterTheDriveWasSilent) {
+  drive_off();
+  faults.set(sim::parse_unit_fault("off").setting);
+  wait(2s);
+  unit.set_stops_by_itself(false);
+  faults.clear();
+  wait(3s);
+  release();
+  EXPECT_FALSE(gate->released());
+  unit.set_stops_by_itself(true);
+  release();
+  EXPECT_TRUE(gate->released()) << testing::PrintToString(told);
+}
+
+// --- Two CiA 402 drives.
+
+struct GatedPair : testing::Test, DriveBench {
+  sim::UnitFaults left_faults{clock}, right_faults{clock};
+  std::unique_ptr<sim::Cia402Unit> unit;
+  std::unique_ptr<drivers::Cia402Drive> drive;
+  std::unique_ptr<GatedDrive> gate;
+  std::vector<std::string> told;
+
+  Answer start(bool watches_master) {
+    sim::Cia402NodeConfig left, right;
+    right.node = 2;
+    right.watches_master = watches_master;
+    unit = std::make_unique<sim::Cia402Unit>(left, right, world, clock, wire.attach(),
+                                             wire.attach(), left_faults, right_faults);
+    drive = std::make_unique<drivers::Cia402Drive>(drivers::Cia402Drive::Config{}, clock,
+                                                   wire.attach());
+    GatedDrive::Config config;
+    config.tell = [this](const std::string& what) { told.push_back(what); };
+    gate = std::make_unique<GatedDrive>(config, clock, *drive);
+    spawn(unit->run());
+    spawn(drive->run());
+    spawn(gate->run());
+    wait(4s);
+    EXPECT_EQ(drive->state(), drivers::DeviceState::running);
+    return run(gate->start());
+  }
+};
+
+TEST_F(GatedPair, IsArmedWhenBothStopWithoutOurHeartbeat) {
+  EXPECT_EQ(start(true), Answer::released) << gate->proof();
+  EXPECT_EQ(world.driven_m(), 0) << "the proof needs no motion";
+  wait(2s);
+  EXPECT_EQ(text(drive->troubles()), "");
+  twist = {0.4, 0};
+  spawn(commander(*gate));
+  wait(2s);
+  EXPECT_GT(world.rolling().forward_mps, 0.39) << testing::PrintToString(told);
+}
+
+TEST_F(GatedPair, IsNotArmedWhenOneGoesOnWithoutOurHeartbeat) {
+  EXPECT_EQ(start(false), Answer::not_proven);
+  EXPECT_THAT(gate->proof(), HasSubstr("went on although it heard no more commands"));
+  twist = {0.4, 0};
+  spawn(commander(*gate));
+  wait(2s);
+  EXPECT_EQ(world.driven_m(), 0);
+}
+
+TEST_F(GatedPair, StaysWhenItsStoInputWasOpenedAndClosed) {
+  EXPECT_EQ(start(true), Answer::released) << gate->proof();
+  twist = {0.4, 0};
+  spawn(commander(*gate));
+  wait(2s);
+  unit->left().open_sto(true);
+  wait(1500ms);
+  EXPECT_NEAR(world.rolling().forward_mps, 0, 0.01);
+  EXPECT_EQ(gate->stopped_by(), FaultCode::drive_fault);
+  unit->left().open_sto(false);
+  wait(5s);
+  EXPECT_NEAR(world.rolling().forward_mps, 0, 0.01) << "it drives on by itself";
+  gate->ask_release();
+  wait(3s);
+  EXPECT_GT(world.rolling().forward_mps, 0.39) << testing::PrintToString(told);
+}
+
+}  // namespace
