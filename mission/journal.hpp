@@ -1,0 +1,93 @@
+// What a mission must still know after a power cut, event by event: durable before it counts.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "hal/clock.hpp"
+#include "hal/compute.hpp"
+#include "hal/wake.hpp"
+#include "mission/files.hpp"
+
+struct sqlite3;
+
+namespace mission {
+
+struct JournalEvent {
+  std::int64_t number{};  // From 1, without gaps; given when it is written.
+  hal::Time at{};
+  std::string kind;  // "station", "scan", "decision", "fault", ...
+  std::string text;  // JSON, on one line.
+  bool operator==(const JournalEvent&) const = default;
+};
+
+// The file: SQLite with a write-ahead log that is flushed to the disk with every commit. Blocks.
+// For one program at a time, on one thread at a time.
+class JournalFile {
+ public:
+  // Makes it where there is none. Fails with errc::device_or_resource_busy when another program has
+  // it open, errc::bad_message when it is damaged or no journal, errc::not_supported when a later
+  // version made it.
+  static FileResult<JournalFile> open(const std::filesystem::path& path);
+
+  // All of them, durable when it returns, or none. Gives them their numbers.
+  FileResult<void> append(std::span<JournalEvent> events);
+  FileResult<std::vector<JournalEvent>> read() const;
+
+ private:
+  struct Close {
+    void operator()(sqlite3* db) const;
+  };
+  JournalFile(std::filesystem::path path, std::unique_ptr<sqlite3, Close> db)
+      : path_(std::move(path)), db_(std::move(db)) {}
+  FileResult<void> prepare();
+  FileResult<void> run(const char* sql) const;
+  FileResult<std::int64_t> number(const char* sql) const;
+  FileResult<void> check() const;
+  FileResult<void> insert(std::span<JournalEvent> events);
+  FileError error(std::string doing, int result) const;
+
+  std::filesystem::path path_;
+  std::unique_ptr<sqlite3, Close> db_;
+  std::int64_t last_ = 0;
+};
+
+// Writes off the event loop, at most 20 times a second: what comes in between shares a commit.
+class Journal {
+ public:
+  static constexpr hal::Duration kPause = std::chrono::milliseconds(50);
+  static constexpr std::size_t kWaitingMax = 256;  // More wait for their turn.
+
+  // Clock and compute must outlive it.
+  Journal(JournalFile file, hal::Clock& clock, hal::Compute& compute)
+      : file_(std::move(file)), clock_(clock), compute_(compute) {}
+
+  hal::Task<void> run();  // Ends only by cancellation.
+
+  // Its number, once it is durable; or why it is not, and then it does not count. Needs run().
+  hal::Task<FileResult<std::int64_t>> append(std::string kind, std::string text);
+
+  std::int64_t commits() const { return commits_; }
+
+ private:
+  struct Waiting {
+    JournalEvent event;
+    FileResult<std::int64_t> outcome{0};
+    bool done = false;
+  };
+  hal::Task<void> write(std::deque<std::shared_ptr<Waiting>> batch);
+
+  JournalFile file_;
+  hal::Clock& clock_;
+  hal::Compute& compute_;
+  std::deque<std::shared_ptr<Waiting>> waiting_;
+  hal::Wake came_, went_;
+  std::int64_t commits_ = 0;
+};
+
+}  // namespace mission

@@ -1,0 +1,220 @@
+// The journal: what it acknowledged is there, whatever happens to the program.
+#include "mission/journal.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sqlite3.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/io_context.hpp>
+#include <cstdlib>
+#include <fstream>
+#include <random>
+
+#include "sim/sim_clock.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace {
+
+using namespace std::chrono_literals;
+using mission::Journal;
+using mission::JournalEvent;
+using mission::JournalFile;
+namespace errc = boost::system::errc;
+
+class JournalTest : public testing::Test {
+ protected:
+  test::TempFolder folder_;
+  std::filesystem::path path_ = folder_.path() / "journal.sqlite";
+
+  JournalFile file() { return JournalFile::open(path_).value(); }
+  static std::vector<JournalEvent> some(int count) {
+    std::vector<JournalEvent> events;
+    for (int i = 0; i < count; ++i)
+      events.push_back({0, hal::Time(i * 1s), "scan", "{\"station\": " + std::to_string(i) + "}"});
+    return events;
+  }
+};
+
+TEST_F(JournalTest, GivesBackWhatWasWrittenInOrder) {
+  std::vector<JournalEvent> first = some(3), second = some(2);
+  second[1].text = std::string("umlaut ü, quote ', zero \0, end", 31);
+  {
+    JournalFile file = this->file();
+    ASSERT_TRUE(file.append(first));
+    ASSERT_TRUE(file.append(second));
+  }
+  JournalFile again = file();
+  const auto events = again.read().value();
+  ASSERT_EQ(events.size(), 5U);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(events[i], first[i]);
+  EXPECT_EQ(events[4], second[1]);
+  EXPECT_EQ(events[4].number, 5);
+  std::vector<JournalEvent> third = some(1);
+  ASSERT_TRUE(again.append(third));
+  EXPECT_EQ(third[0].number, 6);
+}
+
+TEST_F(JournalTest, IsForOneProgramAtATime) {
+  const JournalFile mine = file();
+  const auto other = JournalFile::open(path_);
+  ASSERT_FALSE(other);
+  EXPECT_EQ(other.error().code, errc::device_or_resource_busy) << other.error().text();
+}
+
+TEST_F(JournalTest, RefusesWhatIsNoJournalOrDamaged) {
+  std::ofstream(path_) << std::string(8192, 'x');
+  auto opened = JournalFile::open(path_);
+  ASSERT_FALSE(opened);
+  EXPECT_EQ(opened.error().code, errc::bad_message) << opened.error().text();
+  std::filesystem::remove(path_);
+
+  {
+    JournalFile whole = file();
+    std::vector<JournalEvent> events = some(2000);
+    ASSERT_TRUE(whole.append(events));
+  }
+  {
+    std::fstream damage(path_, std::ios::in | std::ios::out | std::ios::binary);
+    damage.seekp(5 * 4096);
+    damage << std::string(4096, '\x5A');
+  }
+  opened = JournalFile::open(path_);
+  ASSERT_FALSE(opened);
+  EXPECT_EQ(opened.error().code, errc::bad_message) << opened.error().text();
+}
+
+TEST_F(JournalTest, RefusesOtherDatabasesAndLaterVersions) {
+  const auto change = [&](const char* sql) {
+    sqlite3* db = nullptr;
+    ASSERT_EQ(sqlite3_open(path_.c_str(), &db), SQLITE_OK);
+    EXPECT_EQ(sqlite3_exec(db, sql, nullptr, nullptr, nullptr), SQLITE_OK);
+    sqlite3_close(db);
+  };
+  change("CREATE TABLE other (x)");
+  EXPECT_EQ(JournalFile::open(path_).error().code, errc::bad_message);
+  std::filesystem::remove(path_);
+  (void)file();
+  change("PRAGMA user_version=2");
+  EXPECT_EQ(JournalFile::open(path_).error().code, errc::not_supported);
+  change("PRAGMA user_version=1; INSERT INTO events VALUES (7, 0, 'scan', '')");
+  EXPECT_EQ(JournalFile::open(path_).error().code, errc::bad_message) << "events are missing";
+}
+
+TEST_F(JournalTest, NamesAFolderThatIsNotThere) {
+  const auto opened = JournalFile::open(folder_.path() / "no" / "journal.sqlite");
+  ASSERT_FALSE(opened);
+  EXPECT_THAT(opened.error().text(), testing::HasSubstr("cannot open"));
+}
+
+// A child that writes for ever, and tells each acknowledged number.
+int run_child(const std::filesystem::path& path, int tell) {
+  auto opened = JournalFile::open(path);
+  if (!opened) return 1;
+  for (;;) {
+    std::vector<JournalEvent> one{{0, hal::Time(1s), "scan", std::string(300, 's')}};
+    if (!opened->append(one)) return 2;
+    if (write(tell, &one[0].number, sizeof one[0].number) != sizeof one[0].number) return 3;
+  }
+}
+
+TEST_F(JournalTest, KeepsEveryAcknowledgedEventThroughKills) {
+  const int kills = std::getenv("VANTAGE_NIGHTLY") != nullptr ? 1000 : 25;
+  std::mt19937 dice(7);
+  std::int64_t acknowledged = 0;
+  for (int i = 0; i < kills; ++i) {
+    int ends[2];
+    ASSERT_EQ(pipe(ends), 0);
+    const pid_t child = fork();
+    if (child == 0) _exit(run_child(path_, ends[1]));
+    close(ends[1]);
+    usleep(5000 + dice() % 20000);
+    kill(child, SIGKILL);
+    int status = 0;
+    waitpid(child, &status, 0);
+    ASSERT_TRUE(WIFSIGNALED(status)) << "it ended by itself: " << WEXITSTATUS(status);
+    std::int64_t number = 0;
+    while (read(ends[0], &number, sizeof number) == sizeof number) {
+      ASSERT_EQ(number, acknowledged + 1) << "after kill " << i;
+      acknowledged = number;
+    }
+    close(ends[0]);
+    const auto events = file().read().value();
+    ASSERT_GE(static_cast<std::int64_t>(events.size()), acknowledged) << "lost by kill " << i;
+    ASSERT_LE(static_cast<std::int64_t>(events.size()), acknowledged + 1);
+    acknowledged = static_cast<std::int64_t>(events.size());  // One may be written and not told.
+  }
+  EXPECT_GT(acknowledged, kills) << "they wrote hardly anything";
+}
+
+// As on a disk that is full: files may not grow any more.
+int fill_up(const std::filesystem::path& path) {
+  auto opened = JournalFile::open(path);
+  signal(SIGXFSZ, SIG_IGN);
+  const rlimit small{300'000, 300'000};
+  if (!opened || setrlimit(RLIMIT_FSIZE, &small) != 0) return 1;
+  for (int i = 0; i < 1000; ++i) {
+    std::vector<JournalEvent> one{{0, hal::Time(1s), "scan", std::string(2000, 's')}};
+    if (const auto done = opened->append(one); !done)
+      return done.error().text().find("cannot write") == 0 && opened->read() ? 7 : 2;
+  }
+  return 3;
+}
+
+TEST_F(JournalTest, SaysThatTheDiskIsFullAndKeepsTheRest) {
+  const pid_t child = fork();
+  if (child == 0) _exit(fill_up(path_));
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_EQ(WEXITSTATUS(status), 7);
+  EXPECT_GT(file().read().value().size(), 20U);
+}
+
+// --- Off the event loop.
+
+struct Writing : JournalTest {
+  boost::asio::io_context io;
+  sim::SimClock clock{io};
+  hal::ComputeHere compute;
+  std::unique_ptr<Journal> journal;
+  std::vector<std::int64_t> numbers;
+
+  static void rethrow(std::exception_ptr problem) {
+    if (problem) std::rethrow_exception(problem);
+  }
+  void make() {
+    journal = std::make_unique<Journal>(file(), clock, compute);
+    boost::asio::co_spawn(io, journal->run(), rethrow);
+  }
+  hal::Task<void> append(int times) {
+    for (int i = 0; i < times; ++i) {
+      auto number = co_await journal->append("scan", "{}");
+      numbers.push_back(number.value());
+    }
+  }
+};
+
+TEST_F(Writing, CommitsTwentyTimesASecondAtMost) {
+  make();
+  boost::asio::co_spawn(io, append(41), rethrow);
+  ASSERT_TRUE(clock.run([&] { return numbers.size() == 41; }));
+  EXPECT_GE(clock.now(), hal::Time(2s));
+  EXPECT_EQ(journal->commits(), 41);
+}
+
+TEST_F(Writing, SharesACommitAmongWhatComesTogetherWithinItsBound) {
+  make();
+  for (int i = 0; i < 600; ++i) boost::asio::co_spawn(io, append(1), rethrow);
+  ASSERT_TRUE(clock.run([&] { return numbers.size() == 600; }));
+  EXPECT_LE(journal->commits(), 4);
+  EXPECT_GE(journal->commits(), 3) << "600 at once, and only 256 may wait";
+  std::ranges::sort(numbers);
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    ASSERT_EQ(numbers[i], static_cast<std::int64_t>(i) + 1);
+}
+
+}  // namespace
