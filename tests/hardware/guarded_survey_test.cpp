@@ -48,6 +48,7 @@ class Yard {
   }
   GuardedSurvey& survey() { return survey_; }
   sim::UnitFaults& faults(const char* role) { return *robot_.units().faults(role); }
+  sim::AgilexUnit& base() { return *robot_.units().agilex(); }
   Eigen::Vector2d where_m() { return world_.world().robot().pose.position_m; }
   double driven_m() { return world_.world().driven_m(); }
   std::string notes() {
@@ -117,6 +118,12 @@ TEST_P(Losing, StopsTheRobotUntilItIsBack) {
   EXPECT_THAT(sim.yard.notes(), HasSubstr("; do: "));
 
   sim.yard.faults(GetParam()).clear();
+  if (GetParam() == std::string("drive")) {
+    sim.clock.run_until(sim.clock.now() + 20s);
+    EXPECT_NEAR(sim.yard.driven_m(), stopped_m, 0.01) << "nobody has released it";
+    EXPECT_THAT(sim.yard.notes(), HasSubstr("F012-drive-silent"));
+    sim.yard.survey().gate().ask_release();
+  }
   ASSERT_TRUE(sim.run_to_the_end());
   EXPECT_EQ(sim.yard.survey().failure(), "");
   EXPECT_TRUE(sim.yard.survey().survey().record().completed);
@@ -143,6 +150,23 @@ TEST_P(Losing, EndsTheMissionWithTheReasonWhenItStaysAway) {
 
 INSTANTIATE_TEST_SUITE_P(Devices, Losing,
                          testing::Values("drive", "imu", "gnss", "scanner", "pan"));
+
+TEST(GuardedSurvey, WaitsForAPersonAfterAnEstopHoweverLongItIsPressed) {
+  SimYard sim;
+  ASSERT_TRUE(sim.run_until_it_drives(1));
+  sim.yard.base().press_estop(true);
+  sim.clock.run_until(sim.clock.now() + 5min);
+  sim.yard.base().press_estop(false);
+  const double stopped_m = sim.yard.driven_m();
+  sim.clock.run_until(sim.clock.now() + 5min);
+  EXPECT_NEAR(sim.yard.driven_m(), stopped_m, 0.01);
+  EXPECT_FALSE(sim.yard.survey().ended());
+  EXPECT_THAT(sim.yard.notes(), HasSubstr("to release it, press the reset button"));
+  sim.yard.survey().gate().ask_release();
+  ASSERT_TRUE(sim.run_to_the_end());
+  EXPECT_EQ(sim.yard.survey().failure(), "");
+  EXPECT_THAT(sim.yard.notes(), HasSubstr("the robot was released after F001-estop-pressed"));
+}
 
 TEST(GuardedSurvey, TakesAScanAgainThatLostItsScanner) {
   SimYard sim;

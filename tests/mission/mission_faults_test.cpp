@@ -19,6 +19,7 @@ struct Broken {
   bool completes;
   const char* says;      // In the reason for the end; "" where it completes.
   const char* and_says;  // Besides.
+  bool released = true;  // A person releases the robot, 5 s after the trouble is over.
 };
 
 constexpr hal::Duration kEver = 24h;
@@ -50,6 +51,8 @@ TEST_P(BrokenMission, GoesOnOrEndsWithItsReason) {
     const hal::Duration now = backend.clock().now().time_since_epoch();
     if (phase == 0 && now >= broken.from) breaks(backend, broken, true), ++phase;
     if (phase == 1 && now - broken.from >= broken.during) breaks(backend, broken, false), ++phase;
+    if (phase == 2 && broken.released && now - broken.from >= broken.during + 5s)
+      backend.gate().ask_release(), ++phase;
     ASSERT_LT(now, 3h) << "it hangs";
   });
   EXPECT_GE(phase, 1) << "over before anything broke, at " << outcome.record.mission_s << " s";
@@ -85,6 +88,10 @@ INSTANTIATE_TEST_SUITE_P(
         Broken{"EstopForGood", "drive", "", 50s, kEver, false, "held by its e-stop",
                "e-stop pressed"},
         Broken{"EstopForAWhile", "drive", "", 50s, 300s, true, "", ""},
+        Broken{"DriveOffForAWhileAndNobodyReleases", "drive", "off", 50s, 30s, false,
+               "on the way to", "to release it, press the reset button", false},
+        Broken{"EstopForAWhileAndNobodyReleases", "drive", "", 50s, 30s, false, "on the way to",
+               "F001-estop-pressed", false},
         Broken{"ImuOffForGood", "imu", "off", 50s, kEver, true, "", ""},
         Broken{"GnssOffForGood", "gnss", "off", 50s, kEver, true, "", ""}),
     [](const auto& param) { return std::string(param.param.name); });
@@ -100,17 +107,28 @@ TEST(Missions, EndAtOnceWhenThePanUnitIsNotFastEnough) {
   EXPECT_EQ(outcome.record.dropped.size(), 1U);
 }
 
+TEST(Missions, DoNotBeginWhenTheDriveWouldNotStopByItself) {
+  const mission_test::SmallSite site;
+  const auto outcome = site.run(
+      [](mission::SimBackend& backend) { backend.units().agilex()->set_stops_by_itself(false); });
+  EXPECT_FALSE(outcome.record.completed);
+  EXPECT_THAT(outcome.failure, HasSubstr("not armed: F010-drive-no-timeout: it went on"));
+  EXPECT_TRUE(outcome.record.scans.empty());
+}
+
 // The e-stop of two CiA 402 drives takes the torque from both.
 class OpenSto : public testing::TestWithParam<hal::Duration> {};
 
 TEST_P(OpenSto, HoldsTheRobotUntilItIsClosed) {
   const hal::Duration during = GetParam();
   const mission_test::SmallSite site(mission_test::kQuickRobot + "[drive]\ndevice = 'cia402'\n");
+  bool released = false;
   const auto outcome = site.run([&](mission::SimBackend& backend) {
     const hal::Duration now = backend.clock().now().time_since_epoch();
     const bool open = now >= 50s && now < 50s + during;
     backend.units().cia402()->left().open_sto(open);
     backend.units().cia402()->right().open_sto(open);
+    if (!released && now >= 50s + during + 5s) backend.gate().ask_release(), released = true;
     ASSERT_LT(now, 3h) << "it hangs";
   });
   EXPECT_EQ(outcome.record.completed, during < kEver) << outcome.record.end;
