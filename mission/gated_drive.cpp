@@ -29,6 +29,10 @@ constexpr std::uint16_t kEndsProof = static_cast<std::uint16_t>(Condition::estop
                                      static_cast<std::uint16_t>(Condition::bumper) |
                                      static_cast<std::uint16_t>(Condition::fault);
 
+// Reports older than GateConfig::feedback_max stop the robot at once; it is held to be silent,
+// which only a person ends, when that lasts: a program that came late looks the same for a moment.
+constexpr int kSilentCycles = 10;
+
 std::string refusal(boost::system::error_code why) {
   if (why == errc::timed_out) return "it went on although it heard no more commands";
   if (why == errc::io_error) return "it could not be seen to move: free the robot";
@@ -76,12 +80,14 @@ hal::Twist GatedDrive::decide(hal::Time now) {
 // Before the beginning the drive may well be silent or held; a pressed e-stop counts at any time.
 Conditions GatedDrive::look(hal::Time now) {
   status_ = drive_.status();
-  if (begun_ && status_.silent) proven_ = false;  // It may be another one when it is back.
+  silent_cycles_ = status_.silent ? std::min(silent_cycles_ + 1, kSilentCycles) : 0;
+  const bool silent = begun_ && silent_cycles_ == kSilentCycles;
+  if (silent) proven_ = false;  // It may be another one when it is back.
   const auto safety = config_.safety ? config_.safety() : std::nullopt;
   Conditions is;
   is.set(Condition::estop, status_.estop_pressed || (safety && safety->estop_pressed));
   is.set(Condition::bumper, safety && safety->bumper_pressed);
-  is.set(Condition::drive_silent, begun_ && status_.silent);
+  is.set(Condition::drive_silent, silent);
   is.set(Condition::drive_held, status_.remote_control || (begun_ && status_.held));
   is.set(Condition::fault, status_.commanded_by_others);
   is.set(Condition::operator_alive, operator_alive(config_.gate, gate_, now));

@@ -88,6 +88,7 @@ class GatedDrive final : public hal::Drive {
   Answer answer_ = Answer::none;  // To the latest release or start.
   Conditions conditions_;
   hal::DriveStatus status_;
+  int silent_cycles_ = 0;  // In a row.
   bool reset_was_ = false, release_asked_ = false;
   hal::Wake asked_, stopped_, released_;
   std::optional<FaultCode> stopped_by_;

@@ -4,12 +4,14 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <map>
 #include <memory>
 
 #include "drivers/agilex_drive.hpp"
 #include "drivers/cia402_drive.hpp"
 #include "sim/agilex_unit.hpp"
 #include "sim/cia402_unit.hpp"
+#include "tests/drivers/allocations.hpp"
 #include "tests/drivers/drive_bench.hpp"
 
 namespace {
@@ -328,6 +330,7 @@ struct GatedPair : testing::Test, DriveBench {
   sim::UnitFaults left_faults{clock}, right_faults{clock};
   std::unique_ptr<sim::Cia402Unit> unit;
   std::unique_ptr<drivers::Cia402Drive> drive;
+  std::optional<hal::SafetyInputs> safety;
   std::unique_ptr<GatedDrive> gate;
   std::vector<std::string> told;
 
@@ -340,6 +343,7 @@ struct GatedPair : testing::Test, DriveBench {
     drive = std::make_unique<drivers::Cia402Drive>(drivers::Cia402Drive::Config{}, clock,
                                                    wire.attach());
     GatedDrive::Config config;
+    config.safety = [this] { return safety; };
     config.tell = [this](const std::string& what) { told.push_back(what); };
     gate = std::make_unique<GatedDrive>(config, clock, *drive);
     spawn(unit->run());
@@ -371,6 +375,46 @@ TEST_F(GatedPair, IsNotArmedWhenOneGoesOnWithoutOurHeartbeat) {
   EXPECT_EQ(world.driven_m(), 0);
 }
 
+TEST_F(GatedPair, PutsZerosOnTheBusWithinOnePeriodAndAFrame) {
+  ASSERT_EQ(start(true), Answer::released) << gate->proof();
+  std::map<std::uint32_t, std::vector<std::pair<hal::Time, hal::CanFrame>>> targets;  // By id.
+  const auto listen = [&](sim::CanWire::End& tap) -> hal::Task<void> {
+    for (;;) {
+      const auto received = co_await tap.receive();
+      if (received && (received->frame.id == 0x201 || received->frame.id == 0x202))
+        targets[received->frame.id].emplace_back(received->stamp, received->frame);
+    }
+  };
+  spawn(listen(wire.attach()));
+  wait(1s);
+  ASSERT_EQ(targets.size(), 2U);
+  std::map<std::uint32_t, hal::CanFrame> standing;
+  for (const auto& [id, frames] : targets) standing[id] = frames.back().second;
+  twist = {0.4, 0};
+  spawn(commander(*gate));
+  wait(2003ms);
+  ASSERT_GT(world.rolling().forward_mps, 0.39);
+  const hal::Time pressed = clock.now();
+  safety = hal::SafetyInputs{};  // Everything pressed.
+  wait(200ms);
+  for (const auto& [id, frames] : targets) {
+    EXPECT_NE(std::ranges::find_if(frames,
+                                   [&](const auto& each) {
+                                     return each.first > pressed - 25ms &&
+                                            each.second != standing[id];
+                                   }),
+              frames.end())
+        << "it was not told to drive";
+    const auto zero = std::ranges::find_if(frames, [&](const auto& each) {
+      return each.first >= pressed && each.second == standing[id];
+    });
+    ASSERT_NE(zero, frames.end()) << id;
+    EXPECT_LE(zero->first - pressed, mission::kGatePeriod + kFrameTime);
+    for (auto after = zero; after != frames.end(); ++after)
+      EXPECT_EQ(after->second, standing[id]) << "it drives on";
+  }
+}
+
 TEST_F(GatedPair, StaysWhenItsStoInputWasOpenedAndClosed) {
   EXPECT_EQ(start(true), Answer::released) << gate->proof();
   twist = {0.4, 0};
@@ -386,6 +430,62 @@ TEST_F(GatedPair, StaysWhenItsStoInputWasOpenedAndClosed) {
   gate->ask_release();
   wait(3s);
   EXPECT_GT(world.rolling().forward_mps, 0.39) << testing::PrintToString(told);
+}
+
+// --- The loop itself.
+
+// Always well, and obeys nobody.
+class QuietDrive final : public hal::GuardedDrive {
+ public:
+  explicit QuietDrive(hal::Clock& clock) : clock_(clock) {}
+  hal::Task<hal::Result<void>> command(hal::Twist) override { co_return hal::Result<void>{}; }
+  hal::Task<hal::Result<hal::WheelTravel>> next_travel() override {
+    co_await clock_.sleep_for(1h);
+    co_return hal::WheelTravel{};
+  }
+  hal::DriveStatus status() const override {
+    hal::DriveStatus status;
+    status.reported_at = clock_.now();
+    status.silent = status.held = false;
+    return status;
+  }
+  hal::Task<hal::Result<hal::Duration>> prove_timeout() override { co_return hal::Duration(500ms); }
+
+ private:
+  hal::Clock& clock_;
+};
+
+// What a loop allocates in a virtual second, once it runs.
+template <class Loop>
+std::uint64_t allocated_by(Loop loop) {
+  boost::asio::io_context io;
+  sim::SimClock clock(io);
+  QuietDrive drive(clock);
+  GatedDrive::Config config;
+  config.safety = [] {
+    hal::SafetyInputs released;
+    released.estop_pressed = released.bumper_pressed = false;
+    return std::optional(released);
+  };
+  GatedDrive gate(config, clock, drive);
+  boost::asio::co_spawn(io, loop(clock, gate), [](std::exception_ptr problem) {
+    if (problem) std::rethrow_exception(problem);
+  });
+  clock.run_until(hal::Time(1s));
+  const auto before = allocations();
+  clock.run_until(hal::Time(2s));
+  return allocations() - before;
+}
+
+TEST(GatedDriveLoop, AllocatesNoMoreThanTheSleepsOfItsClock) {
+  const auto sleeps = [](hal::Clock& clock, GatedDrive&) -> hal::Task<void> {
+    for (hal::Time next = clock.now();; next += mission::kGatePeriod)
+      co_await clock.sleep_until(next);
+  };
+  const auto gates = [](hal::Clock&, GatedDrive& gate) { return gate.run(); };
+  const std::uint64_t by_sleeps = allocated_by(sleeps);
+  EXPECT_GE(by_sleeps, 100U) << "the simulated clock keeps a list of sleepers";
+  EXPECT_LE(allocated_by(gates), by_sleeps);
 }
 
 }  // namespace

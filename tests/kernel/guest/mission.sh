@@ -44,6 +44,27 @@ need_told() { # PATTERN, SECONDS
   echo "vantaged did not say '$1': $(tail -n 2 /tmp/vantaged.log | tr '\n' ' ')" >&3
   exit 1
 }
+need_told_twice() { # PATTERN, SECONDS
+  for _ in $(seq $(($2 * 5))); do
+    [ "$(grep -cE "$1" /tmp/vantaged.log)" -ge 2 ] && return 0
+    sleep 0.2
+  done
+  echo "vantaged did not say '$1' twice" >&3
+  exit 1
+}
+# As a person does, once the program has said how. The drive's time-out is proven anew meanwhile.
+release_robot() {
+  need_told 'to release it, .*kill -USR1' 10
+  local before
+  before=$(grep -c 'the robot was released after F01' /tmp/vantaged.log || true)
+  for _ in $(seq 10); do
+    kill -USR1 $mission
+    sleep 3
+    [ "$(grep -c 'the robot was released after F01' /tmp/vantaged.log || true)" -gt "$before" ] && return 0
+  done
+  echo "the robot is not released: $(tail -n 2 /tmp/vantaged.log | tr '\n' ' ')" >&3
+  exit 1
+}
 mission_ends() { # EXIT CODE, SECONDS
   local code=0
   for _ in $(seq $(($2 * 5))); do
