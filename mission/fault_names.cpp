@@ -16,7 +16,8 @@ constexpr FaultNames kFaultNames[] = {
     {"drive", FaultCode::nothing_wrong, "no error"},
     {"drive", FaultCode::estop_pressed, "e-stop pressed|vendor bit 15"},
     {"drive", FaultCode::remote_control, "remote control has command"},
-    {"drive", FaultCode::drive_commanded_by_others, "another device or master on the bus|another program commands the base"},
+    {"drive", FaultCode::drive_commanded_by_others,
+     "another device or master on the bus|another program commands the base"},
     {"drive", FaultCode::drive_silent,
      "no reports from the base|base's state is frozen|drive silent|"
      "drive stopped reporting"},
