@@ -278,7 +278,7 @@ Gate LocalizerFilter::take(const LocalizerConfig& config, const GnssPosition& fi
     return gate;
   }
   const double sigma_m = std::sqrt(claimed.diagonal().maxCoeff());
-  if (!lost(config, fix, sigma_m)) return Gate::rejected;
+  if (!lost(config, fix, sigma_m, innovation.norm())) return Gate::rejected;
   const double off_m2 = innovation.squaredNorm();
   covariance_.topLeftCorner<2, 2>() += off_m2 * Eigen::Matrix2d::Identity();
   // It went astray over the way of the streak: so may have its heading.
@@ -289,15 +289,20 @@ Gate LocalizerFilter::take(const LocalizerConfig& config, const GnssPosition& fi
   return Gate::reset;
 }
 
-bool LocalizerFilter::lost(const LocalizerConfig& config, const GnssPosition& fix, double sigma_m) {
+bool LocalizerFilter::lost(const LocalizerConfig& config, const GnssPosition& fix, double sigma_m,
+                           double off_m) {
   const double way_m = agreeing_ ? odometer_m_ - agreeing_->odometer_m : 0;
   const bool agrees =
       agreeing_ && (fix.position_m - agreeing_->position_m).norm() <= 6 * sigma_m + 1.5 * way_m;
   if (!agrees) agreeing_ = Agreeing{fix.stamp, fix.position_m, odometer_m_, odometer_m_};
   agreeing_->position_m = fix.position_m;
   agreeing_->odometer_m = odometer_m_;
-  return hal::seconds(fix.stamp - agreeing_->first) >= config.lost_after_s &&
-         odometer_m_ - agreeing_->first_odometer_m >= config.lost_after_m;
+  if (confirmed_ && *confirmed_ >= agreeing_->first) return false;
+  const bool far = off_m > config.lost_share * (odometer_m_ - agreed_at_m_) + 6 * sigma_m;
+  const double after_s = far ? config.lost_far_after_s : config.lost_after_s;
+  const double after_m = far ? config.lost_far_after_m : config.lost_after_m;
+  return hal::seconds(fix.stamp - agreeing_->first) >= after_s &&
+         odometer_m_ - agreeing_->first_odometer_m >= after_m;
 }
 
 Gate LocalizerFilter::take(const LocalizerConfig& config, const GnssVelocity& fix) {
@@ -427,6 +432,9 @@ void LocalizerFilter::note(Source source, hal::Time stamp, bool refused) {
   RefusalStreak& streak = refusals_[static_cast<std::size_t>(source)];
   if (!refused) {
     streak = {};
+    if (source == Source::gnss_velocity) return;  // Tells of no place.
+    agreed_at_m_ = odometer_m_;
+    if (source != Source::gnss_position) confirmed_ = stamp;
     return;
   }
   if (streak.count++ == 0) streak.first = stamp;

@@ -39,9 +39,15 @@ struct LocalizerConfig {
   double gate_chi2 = 13.8;
   double gate3_chi2 = 16.3;
   // When fixes that agree with each other were refused for this long and this far, the filter is
-  // taken to be the one that is lost. Both must hold: no jump moves a robot that stands.
+  // taken to be the one that is lost. Both must hold: no jump moves a robot that stands. And what
+  // it would be off by must be what wheels may have missed: this share of the way since anything
+  // agreed with it. Farther off, the fixes must have gone on for much longer: multipath does not
+  // follow a robot so far. Nothing is lost that something else has confirmed meanwhile.
   double lost_after_s = 20.0;
   double lost_after_m = 10.0;
+  double lost_share = 0.25;
+  double lost_far_after_s = 60.0;
+  double lost_far_after_m = 60.0;
   // So many refused poses in a row that move the localizer's by the same: it is the one that is
   // lost (carried, or its wheels were silent).
   int lost_poses = 3;
@@ -155,7 +161,7 @@ class LocalizerFilter {
   void forget_tilt(const LocalizerConfig& config, double way_m);
   void level(const LocalizerConfig& config, const Turn& turn, double span_s, double accel_mps2);
   void wander(const LocalizerConfig& config, hal::Time now);
-  bool lost(const LocalizerConfig& config, const GnssPosition& fix, double sigma_m);
+  bool lost(const LocalizerConfig& config, const GnssPosition& fix, double sigma_m, double off_m);
   bool lost(const LocalizerConfig& config, const PoseFix& fix);
   Eigen::Vector2d ahead_m(hal::Time stamp) const;
   void correct(const State& error);
@@ -181,7 +187,9 @@ class LocalizerFilter {
   std::array<RefusalStreak, kSources> refusals_{};
   double speed_mps_{}, turn_radps_{};  // Of the last travel report.
   Eigen::Vector2d side_speed_mps_{0, 0};
-  double odometer_m_{};  // All travel, forward or backward.
+  double odometer_m_{};   // All travel, forward or backward.
+  double agreed_at_m_{};  // The same when anything last told where it is and was accepted,
+  std::optional<hal::Time> confirmed_;  // and when that was anything but satellites.
   double still_s_{};
   double last_nis_{};
   int last_dimension_{};

@@ -70,6 +70,7 @@ class World {
   }
 
   double normal(double sigma) { return sigma * normal_(random_); }
+  hal::Time now() const { return now_; }
 
   hal::Pose2 truth;
   std::vector<nav::Gate> gates;
@@ -298,12 +299,54 @@ TEST(Localizer, ScatteredOutliersWhileDrivingNeverAddUpToAReset) {
   for (const auto gate : world.gates) ASSERT_EQ(gate, nav::Gate::rejected);
 }
 
+// All fixes 40 m off, all alike, for longer than it takes to be lost otherwise.
+TEST(Localizer, MultipathThatLastsDoesNotMoveItWhileItsWheelsDisagree) {
+  World world({}, 19);
+  auto filter = filter_for(world);
+  world.run(filter, 1, 0.05, 30);
+  const auto jump = [](hal::GnssFix& fix) { fix.position_m += Eigen::Vector2d(25, -30); };
+  world.gates.clear();
+  world.run(filter, 1, 0.02, 45, jump);
+  for (const auto gate : world.gates) ASSERT_EQ(gate, nav::Gate::rejected);
+  EXPECT_LT(error_of(filter, world).head<2>().norm(), 1.5);
+  EXPECT_LT(nees(filter, world), 16);
+  EXPECT_FALSE(filter.faults().empty());
+  world.gates.clear();
+  world.run(filter, 1, 0.02, 10);
+  EXPECT_EQ(std::count(world.gates.begin(), world.gates.end(), nav::Gate::reset), 0);
+  EXPECT_GE(std::count(world.gates.begin(), world.gates.end(), nav::Gate::accepted), 45);
+  EXPECT_LT(error_of(filter, world).head<2>().norm(), 0.15);
+}
+
+// However long it lasts, when scans say that the robot is where it thinks.
+TEST(Localizer, MultipathNeverMovesItWhileScansConfirmWhereItIs) {
+  World world({}, 21);
+  auto filter = filter_for(world);
+  world.run(filter, 1, 0.05, 30);
+  const auto jump = [](hal::GnssFix& fix) { fix.position_m += Eigen::Vector2d(25, -30); };
+  world.gates.clear();
+  for (int leg = 0; leg < 10; ++leg) {
+    world.run(filter, 1, 0.03, 25, jump);
+    const Eigen::Matrix3d covariance =
+        Eigen::Vector3d(0.01, 0.01, 0.1 * kDeg).cwiseAbs2().asDiagonal();
+    const auto fix = filter.add(nav::PoseFix{world.now(), world.truth, covariance});
+    ASSERT_EQ(fix.gate, nav::Gate::accepted) << leg;
+    ASSERT_LT(error_of(filter, world).head<2>().norm(), 0.1) << leg;
+  }
+  for (const auto gate : world.gates) ASSERT_EQ(gate, nav::Gate::rejected);
+  world.gates.clear();
+  world.run(filter, 1, 0, 10);
+  EXPECT_GE(std::count(world.gates.begin(), world.gates.end(), nav::Gate::accepted), 45);
+}
+
 TEST(Localizer, FindsItsWayBackWhenItWasCarriedAway) {
   World world({}, 15);
   auto filter = filter_for(world);
   world.run(filter, 1, 0, 20);
   world.truth.position_m.y() += 15;
-  world.run(filter, 1, 0, 60);
+  world.run(filter, 1, 0, 50);
+  for (const auto gate : world.gates) ASSERT_NE(gate, nav::Gate::reset);  // Might be multipath.
+  world.run(filter, 1, 0, 40);
   EXPECT_EQ(std::count(world.gates.begin(), world.gates.end(), nav::Gate::reset), 1);
   EXPECT_LT(error_of(filter, world).head<2>().norm(), 0.1);
   EXPECT_LT(nees(filter, world), 16);
