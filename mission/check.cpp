@@ -21,6 +21,7 @@ class SiteCheck {
 
   std::vector<ConfigError> run() {
     for (const auto& [region, mode] : config_.regions) check_region(region, mode);
+    check_outage();
     check_room();
     check_start();
     check_voxel_count();
@@ -33,6 +34,14 @@ class SiteCheck {
     const ConfigPlace place =
         found == config_.written.end() ? ConfigPlace{config_.file, 1, 1} : found->second;
     errors_.push_back({place.file, place.line, place.column, std::move(message)});
+  }
+
+  void check_outage() {
+    const std::string& region = config_.robot.sim.gnss_outage;
+    const bool known = std::ranges::any_of(
+        map_.regions, [&](const nav::Region& on_map) { return on_map.name == region; });
+    if (!region.empty() && !known)
+      fail("robot.sim.gnss_outage", fmt::format("the map has no region '{}'", region));
   }
 
   void check_region(const std::string& region, const std::string& mode) {

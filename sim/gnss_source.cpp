@@ -37,6 +37,7 @@ GnssMoment GnssSource::sample() {
   moment.at.latitude_deg *= faults_.wrong_factor();
   moment.at.longitude_deg *= faults_.wrong_factor();
   moment.sigma_m = fix.sigma_m;
+  moment.hidden = world_.gnss_hidden();
   const double since_ns = static_cast<double>(clock_.now().time_since_epoch().count());
   const std::int64_t gps_ms =
       config_.itow_ms + std::llround(since_ns * (1 + config_.clock_skew) / 1e6);

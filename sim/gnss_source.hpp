@@ -31,7 +31,14 @@ struct GnssMoment {
   std::uint32_t itow_ms{};
   std::int64_t utc_time_of_day_ns{};
   drivers::GnssDate date;
+  bool hidden{};  // No satellite is seen from there.
 };
+
+// What the receiver has of the sky at that moment.
+inline GnssSky sky_at(const GnssMoment& moment, GnssSky sky) {
+  if (moment.hidden) sky = {drivers::GnssQuality::none, 0};
+  return sky;
+}
 
 // The world's only reader of sample_gnss(); measures at whole multiples of the period of our time.
 class GnssSource {

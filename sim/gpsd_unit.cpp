@@ -110,12 +110,13 @@ hal::Task<void> GpsdUnit::stream() {
 
 std::string GpsdUnit::report(const GnssMoment& moment) const {
   const std::string head = R"({"class":"TPV","device":")" + config_.device + "\"";
-  if (sky_.quality == GnssQuality::none) return head + R"(,"mode":1})";
+  const GnssSky sky = sky_at(moment, sky_);
+  if (sky.quality == GnssQuality::none) return head + R"(,"mode":1})";
   constexpr double k95 = 1.96;
   return head +
          formatted(R"(,"status":%d,"mode":3,"time":"%s","lat":%.9f,"lon":%.9f,"altHAE":%.4f,)"
                    R"("epx":%.4f,"epy":%.4f,"epv":%.4f})",
-                   status_of(sky_.quality), iso_time(moment).c_str(), moment.at.latitude_deg,
+                   status_of(sky.quality), iso_time(moment).c_str(), moment.at.latitude_deg,
                    moment.at.longitude_deg, moment.at.height_m, k95 * moment.sigma_m,
                    k95 * moment.sigma_m, k95 * 2 * moment.sigma_m);
 }

@@ -90,7 +90,8 @@ hal::Task<void> NmeaUnit::run() {
     co_await source_.next_due(config_.source.rate_hz);
     if (faults_.silent()) continue;
     int kind = 0;
-    const auto sentences = nmea_sentences(source_.sample(), sky_, config_.form);
+    const GnssMoment moment = source_.sample();
+    const auto sentences = nmea_sentences(moment, sky_at(moment, sky_), config_.form);
     for (const std::string& sentence : sentences) {
       const auto sent = co_await out_.write(drivers::as_bytes(sentence), kind++);
       if (!sent) co_await clock_.sleep_for(kLinkPause);

@@ -209,12 +209,13 @@ hal::Task<void> UbloxUnit::stream() {
 }
 
 std::vector<Bytes> UbloxUnit::messages_of(const GnssMoment& moment) const {
-  const bool fix = sky_.quality != GnssQuality::none;
+  const GnssSky sky = sky_at(moment, sky_);
+  const bool fix = sky.quality != GnssQuality::none;
   std::vector<Bytes> messages;
   if (value(kUart1OutNmea) != 0 && value(kUsbOutNmea) != 0)
-    for (const std::string& sentence : nmea_sentences(moment, sky_, {}))
+    for (const std::string& sentence : nmea_sentences(moment, sky, {}))
       messages.emplace_back(sentence.begin(), sentence.end());
-  if (sends(kNavPvtUart1)) messages.push_back(encode_ubx(nav_pvt(moment, sky_)));
+  if (sends(kNavPvtUart1)) messages.push_back(encode_ubx(nav_pvt(moment, sky)));
   if (sends(kNavHpposllhUart1)) {
     UbxNavHpposllh high = nav_hpposllh(moment);
     high.invalid = !fix;

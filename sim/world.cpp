@@ -249,4 +249,18 @@ hal::GnssFix World::sample_gnss() {
           config_.gnss_sigma_m};
 }
 
+// Even and odd crossings of a line to the east.
+bool World::gnss_hidden() const {
+  const Eigen::Vector2d& at = robot_.pose.position_m;
+  bool inside = false;
+  for (const auto& outline : config_.gnss_outages)
+    for (std::size_t i = 0; i < outline.size(); ++i) {
+      const Eigen::Vector2d &a = outline[i], &b = outline[(i + 1) % outline.size()];
+      if ((a.y() > at.y()) == (b.y() > at.y())) continue;
+      const double x_m = a.x() + (at.y() - a.y()) / (b.y() - a.y()) * (b.x() - a.x());
+      if (x_m > at.x()) inside = !inside;
+    }
+  return inside;
+}
+
 }  // namespace sim

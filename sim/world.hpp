@@ -43,6 +43,9 @@ struct WorldConfig {
   double gnss_sigma_m = 0.03;
   double gnss_wander_share = 0.5;  // Of the variance.
   double gnss_wander_s = 60;       // Correlation time.
+  // Outlines in W within which no satellite is seen: courtyards, halls. Ground within an even
+  // number of them is not.
+  std::vector<std::vector<Eigen::Vector2d>> gnss_outages;
 
   // A scanner set up by hand: how far from the wanted pose, and how well it is surveyed then.
   double placement_offset_sigma_m = 0.05;
@@ -105,6 +108,7 @@ class World {
   hal::WheelTravel take_travel();  // Whole encoder ticks since the last call.
   hal::ImuSample sample_imu();     // Yaw rate over the latest tick.
   hal::GnssFix sample_gnss();
+  bool gnss_hidden() const;  // No satellite is seen where the robot is.
 
   // Where a scanner can stand near a pose: errc::address_not_available as put_robot, with the
   // tripod's radius.

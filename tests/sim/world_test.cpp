@@ -250,6 +250,23 @@ TEST(World, GnssErrorIsAsLargeAsTheReceiverClaimsAndPartlyWanders) {
   EXPECT_NEAR(lagged_m2 / square_m2, 0.5 * std::exp(-1 / 60.0), 0.05);
 }
 
+TEST(World, NoSatelliteIsSeenWithinAnOutage) {
+  sim::WorldConfig config = perfect();
+  config.gnss_outages = {{{0, 0}, {10, 0}, {10, 4}, {4, 4}, {4, 10}, {0, 10}},
+                         {{20, 0}, {30, 0}, {25, 5}}};
+  Driven robot(sim_test::plain(100), config);
+  const auto hidden_at = [&](double x_m, double y_m) {
+    EXPECT_TRUE(robot.world.put_robot(pose(x_m, y_m, 0), 0));
+    return robot.world.gnss_hidden();
+  };
+  EXPECT_TRUE(hidden_at(2, 8));
+  EXPECT_TRUE(hidden_at(8, 2));
+  EXPECT_FALSE(hidden_at(8, 8));  // In the notch.
+  EXPECT_TRUE(hidden_at(25, 2));
+  EXPECT_FALSE(hidden_at(15, 2));
+  EXPECT_FALSE(hidden_at(-5, 2));
+}
+
 TEST(World, OneSensorsNoiseDoesNotChangeAnothers) {
   const sim::Scene scene(sim_test::plain(100));
   const auto run = [&](bool read_others) {
