@@ -294,6 +294,25 @@ PreparedScan::~PreparedScan() = default;
 PreparedScan::PreparedScan(PreparedScan&&) noexcept = default;
 PreparedScan& PreparedScan::operator=(PreparedScan&&) noexcept = default;
 
+double overlap_at(const PreparedScan& reference, const PreparedScan& reading,
+                  const Eigen::Isometry3d& T_reference_reading, double within_m) {
+  const Points& points = reading.parts().levels.front().points.points_m();
+  const NearestPoints& there = reference.parts().levels.front().points;
+  const Eigen::Isometry3f pose = T_reference_reading.cast<float>();
+  const auto near = std::ranges::count_if(points, [&](const Eigen::Vector3f& p) {
+    Neighbour unused;
+    return there.nearest(pose * p, static_cast<float>(within_m), unused);
+  });
+  return static_cast<double>(near) / static_cast<double>(std::max<std::size_t>(1, points.size()));
+}
+
+double conflict_at(const PreparedScan& reference, const PreparedScan& reading,
+                   const Eigen::Isometry3d& T_reference_reading) {
+  const std::size_t finest = reference.parts().levels.size() - 1;
+  return conflict_of(reference.parts(), reading.parts(), T_reference_reading,
+                     finest > 0 ? finest - 1 : 0);
+}
+
 Registration register_scans(const PreparedScan& reference, const PreparedScan& reading,
                             const Eigen::Isometry3d& guess_T_reference_reading,
                             const RegistrationConfig& config, const RunPieces& run) {

@@ -110,6 +110,15 @@ Registration register_scans(const PreparedScan& reference, const PreparedScan& r
                             const Eigen::Isometry3d& guess_T_reference_reading,
                             const RegistrationConfig& config, const RunPieces& run = {});
 
+// Share of the reading that has the reference within `within_m` where the pose puts it: how much
+// they would overlap, from the coarsest clouds only. Cheap; says nothing of how well they fit.
+double overlap_at(const PreparedScan& reference, const PreparedScan& reading,
+                  const Eigen::Isometry3d& T_reference_reading, double within_m);
+
+// Registration::conflict as it would be at that pose, without moving it.
+double conflict_at(const PreparedScan& reference, const PreparedScan& reading,
+                   const Eigen::Isometry3d& T_reference_reading);
+
 // "x", "y and z", or "(0.71, -0.71, 0.00)": a direction for people.
 std::string in_words(const Eigen::Vector3d& direction);
 
