@@ -87,6 +87,7 @@ struct SimConfig {
   double gyro_sigma_degps = 0.05;
   double gyro_bias_degps = 0.02;
   double gnss_sigma_m = 0.03;
+  std::string gnss_outage;          // Region of the map where no satellite is seen; empty: none.
   double placement_sigma_m = 0.01;  // A scanner set up by hand on surveyed marks.
   double placement_heading_sigma_deg = 0.05;
   double placement_s = 900.0;  // Time to carry it there and set it up.
@@ -139,6 +140,22 @@ struct Phase2Config {
   double density_min_ppm2 = 0;  // Points per m^2 that every surface should get; 0: no such goal.
 };
 
+// [localize]
+struct LocalizeConfig {
+  bool match_map = true;  // Every scan's walls against those of the map.
+};
+
+// [register]
+struct RegisterConfig {
+  bool scans = true;          // Every scan against those that it overlaps.
+  int references_max = 4;     // Scans that a new one is laid against: those that it overlaps most.
+  int in_hand_max = 150;      // Thinned clouds kept; then the oldest is no reference any more.
+  double overlap_min = 0.25;  // Of a scan with another where the localizer has it, to be tried.
+  double rms_max_m = 0.06;
+  bool retake = true;    // A scan that is refused is taken once more.
+  bool tour_end = true;  // All pairs together when a tour closes; the map is filled anew.
+};
+
 // Where a key was written. Line and column count from 1; 0 says "the whole file" (or no file).
 struct ConfigPlace {
   std::string file;
@@ -175,8 +192,10 @@ struct MissionConfig {
   std::map<std::string, std::string> regions;  // [regions] name = "robot" | "manual" | "skip"
   Phase1Config phase1;
   Phase2Config phase2;
-  RobotConfig robot;  // Read from robot_file.
-  SavedPlan plan;     // Read from plan_file; without one Phase I is planned.
+  LocalizeConfig localize;
+  RegisterConfig registration;  // [register]
+  RobotConfig robot;            // Read from robot_file.
+  SavedPlan plan;               // Read from plan_file; without one Phase I is planned.
 
   // Where each value that is not a default came from, by the path of the member it set: "seed",
   // "robot" and "site" (the keys), "phase2.voxel_m", "regions.moat", "robot.scanner.range_max_m".

@@ -118,6 +118,45 @@ SectionSpec phase2_section() {
           {}};
 }
 
+SectionSpec localize_section() {
+  using L = LocalizeConfig;
+  const Keys<L> keys{[](MissionConfig& c) -> L& { return c.localize; }};
+  return {ConfigFile::mission,
+          "localize",
+          "Where the robot is.",
+          {keys.other("match_map", &L::match_map,
+                      "Lay the walls that a scan shows over those of the map: where satellites "
+                      "are not seen, that holds the robot to the map")},
+          {},
+          {}};
+}
+
+SectionSpec register_section() {
+  using R = RegisterConfig;
+  const Keys<R> keys{[](MissionConfig& c) -> R& { return c.registration; }};
+  return {ConfigFile::mission,
+          "register",
+          "Where scans really stood, by laying them over each other.",
+          {keys.other("scans", &R::scans,
+                      "Lay every scan over those that it overlaps; its pose is corrected by what "
+                      "fits, and a scan that contradicts them is not merged"),
+           keys.number("references_max", &R::references_max, 1, 50, "",
+                       "Over so many scans at most, those that it overlaps most"),
+           keys.number("in_hand_max", &R::in_hand_max, 1, 10'000, "",
+                       "Thinned scans kept in memory to lay others over, about 3 MB each; then the "
+                       "oldest goes"),
+           keys.number("overlap_min", &R::overlap_min, 0.05, 1, "share",
+                       "Of a scan's surface that another must show for the two to be tried"),
+           keys.number("rms_max_m", &R::rms_max_m, 0.001, 1, "m",
+                       "Of distances between surfaces; with more, two scans do not fit"),
+           keys.other("retake", &R::retake, "Take a scan that is refused once more"),
+           keys.other("tour_end", &R::tour_end,
+                      "When a tour closes, and at the end, find the poses that fit all pairs of "
+                      "scans best and fill the map anew from them")},
+          {},
+          {}};
+}
+
 SectionSpec regions_section() {
   return {ConfigFile::mission,
           "regions",
@@ -319,6 +358,9 @@ SectionSpec sim_section() {
            keys.number("gyro_bias_degps", &S::gyro_bias_degps, 0, 10, "deg/s", "Bias of the gyro"),
            keys.number("gnss_sigma_m", &S::gnss_sigma_m, 0, 100, "m",
                        "Noise of a satellite fix, per axis"),
+           keys.other("gnss_outage", &S::gnss_outage,
+                      "Region of the map in which no satellite is seen, as in a courtyard; empty: "
+                      "none"),
            keys.number("placement_sigma_m", &S::placement_sigma_m, 0, 10, "m",
                        "Survey error of a scanner set up by hand"),
            keys.number("placement_heading_sigma_deg", &S::placement_heading_sigma_deg, 0, 45, "deg",
@@ -405,10 +447,10 @@ std::string_view name(ConfigFile file) {
 
 const std::vector<SectionSpec>& config_schema() {
   static const std::vector<SectionSpec> schema{
-      mission_section(), phase1_section(), phase2_section(), regions_section(),
-      robot_section(),   body_section(),   drive_section(),  scanner_section(),
-      pan_section(),     imu_section(),    gnss_section(),   power_section(),
-      battery_section(), sim_section(),    plan_section(),   station_section()};
+      mission_section(), phase1_section(), phase2_section(), localize_section(), register_section(),
+      regions_section(), robot_section(),  body_section(),   drive_section(),    scanner_section(),
+      pan_section(),     imu_section(),    gnss_section(),   power_section(),    battery_section(),
+      sim_section(),     plan_section(),   station_section()};
   return schema;
 }
 

@@ -38,6 +38,8 @@ class DensityGoal {
   };
   void restore(const planning::VoxelMap& map, const std::vector<PastScan>& scans,
                const std::vector<planning::Voxel>& set_aside);
+  // Takes up what an earlier one had tried in vain.
+  void take_up(const DensityGoal& before) { tries_ = before.tries_; }
   // What was tried in vain, ordered by z, then y, then x.
   std::vector<planning::Voxel> set_aside() const;
 

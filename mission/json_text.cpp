@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <boost/json/serialize.hpp>
 #include <cmath>
+#include <numbers>
 
 namespace mission {
 namespace {
@@ -97,6 +98,12 @@ double rounded(double value, int decimals) {
   const double whole = std::round(value * scale);
   // + 0.0 turns -0 into 0.
   return std::abs(whole) < 9e15 ? whole / scale + 0.0 : value;
+}
+
+boost::json::object exact_json(const hal::Pose2& pose) {
+  return {{"x_m", pose.position_m.x()},
+          {"y_m", pose.position_m.y()},
+          {"heading_deg", pose.heading_rad * 180 / std::numbers::pi}};
 }
 
 }  // namespace mission

@@ -1,8 +1,11 @@
 // JSON as text, the same text for the same values on every machine.
 #pragma once
 
+#include <boost/json/object.hpp>
 #include <boost/json/value.hpp>
 #include <string>
+
+#include "hal/values.hpp"
 
 namespace mission {
 
@@ -16,5 +19,8 @@ std::string json_pretty(const boost::json::value& value);
 
 // To that many decimals, so that people read 12.346 rather than 12.345678901234567.
 double rounded(double value, int decimals);
+
+// x_m, y_m and heading_deg, not rounded: for decisions.
+boost::json::object exact_json(const hal::Pose2& pose);
 
 }  // namespace mission

@@ -57,6 +57,13 @@ sim::WorldConfig world_config(const MissionConfig& config, const SiteTasks& task
   world.gyro_sigma_radps = radians(robot.sim.gyro_sigma_degps);
   world.gyro_bias_sigma_radps = radians(robot.sim.gyro_bias_degps);
   world.gnss_sigma_m = robot.sim.gnss_sigma_m;
+  for (const AreaTask& task : tasks.tasks) {
+    if (robot.sim.gnss_outage.empty() || task.area.region != robot.sim.gnss_outage) continue;
+    for (const nav::Polygon& polygon : task.area.drivable) {
+      auto& outline = world.gnss_outages.emplace_back();
+      for (const nav::PointMm vertex : polygon.outer) outline.push_back(nav::to_m(vertex));
+    }
+  }
   world.placement_sigma_m = robot.sim.placement_sigma_m;
   world.placement_heading_sigma_rad = radians(robot.sim.placement_heading_sigma_deg);
   world.placement_s = robot.sim.placement_s;
@@ -206,8 +213,9 @@ Truth SimBackend::judge(RunRecord& record, const SiteModel& model,
 void SimBackend::judge_poses(RunRecord& record, Truth& truth) const {
   double squares_m2 = 0, nees = 0;
   for (ScanRecord& scan : record.scans) {
+    // Not every scan taken is one that counts.
     const sim::ScanTruth& at =
-        true_site_.world().scans().at(static_cast<std::size_t>(scan.number - 1));
+        *std::ranges::find(true_site_.world().scans(), scan.stamp, &sim::ScanTruth::stamp);
     scan.truth = at.at.pose;
     Eigen::Vector3d error;
     error << scan.believed.position_m - at.at.pose.position_m,
@@ -216,6 +224,14 @@ void SimBackend::judge_poses(RunRecord& record, Truth& truth) const {
     truth.position_error_max_m = std::max(truth.position_error_max_m, distance_m);
     truth.heading_error_max_rad = std::max(truth.heading_error_max_rad, std::abs(error.z()));
     squares_m2 += distance_m * distance_m;
+    if (!scan.by_hand && scan.fit.verdict != ScanVerdict::off) {
+      const hal::Pose2& before = scan.fit.before;
+      truth.before_error_max_m =
+          std::max(truth.before_error_max_m, (before.position_m - at.at.pose.position_m).norm());
+      truth.before_error_max_rad =
+          std::max(truth.before_error_max_rad,
+                   std::abs(wrapped(before.heading_rad - at.at.pose.heading_rad)));
+    }
     nees += error.dot(scan.covariance.ldlt().solve(error));
   }
   const double scans = static_cast<double>(std::max<std::size_t>(record.scans.size(), 1));

@@ -92,7 +92,9 @@ Pilot::Pilot(const RobotConfig& config, hal::Clock& clock, hal::Devices& devices
     : config_(config),
       clock_(clock),
       devices_(devices),
-      localizer_(localizer_config(config), start, start_covariance()) {}
+      localizer_(localizer_config(config), start, start_covariance()),
+      alone_(localizer_),
+      sensors_(clock.now()) {}
 
 hal::Task<void> Pilot::track() {
   using boost::asio::experimental::awaitable_operators::operator&&;
@@ -103,6 +105,7 @@ hal::Task<void> Pilot::track_travel() {
   for (;;) {
     const hal::WheelTravel travel = (co_await devices_.drive.next_travel()).value();
     localizer_.predict(travel);
+    alone_.predict(travel);
     travelled_m_ += std::abs(travel.left_m + travel.right_m) / 2;
   }
 }
@@ -110,10 +113,13 @@ hal::Task<void> Pilot::track_travel() {
 hal::Task<void> Pilot::track_imu() {
   for (;;) {
     const auto sample = co_await devices_.imu.next_sample();
-    if (sample)
-      localizer_.predict(*sample);
-    else  // The wheels tell the turns meanwhile.
+    if (!sample) {  // The wheels tell the turns meanwhile.
       co_await clock_.sleep_for(kAskAgain);
+      continue;
+    }
+    sensors_.heard(SensorLog::Sensor::imu, clock_.now());
+    localizer_.predict(*sample);
+    alone_.predict(*sample);
   }
 }
 
@@ -125,10 +131,19 @@ hal::Task<void> Pilot::track_gnss() {
       continue;
     }
     const nav::Gate gate = localizer_.correct(*fix);
-    ++gnss_.fixes;
-    gnss_.refused += gate == nav::Gate::rejected;
-    gnss_.resets += gate == nav::Gate::reset;
+    if (gate != nav::Gate::rejected) alone_.correct(*fix);
+    sensors_.heard(SensorLog::Sensor::gnss, clock_.now());
+    sensors_.judged(gate, clock_.now());
   }
+}
+
+nav::Correction Pilot::correct(const hal::Pose2& pose, const Eigen::Matrix3d& covariance) {
+  return localizer_.add(nav::PoseFix{clock_.now(), pose, covariance});
+}
+
+nav::Correction Pilot::correct_by_map(const hal::Pose2& pose, const Eigen::Matrix3d& covariance) {
+  alone_.add(nav::PoseFix{clock_.now(), pose, covariance});
+  return correct(pose, covariance);
 }
 
 hal::Task<LegEnd> Pilot::drive_to(Roads& roads, hal::Pose2 goal) {

@@ -11,6 +11,7 @@
 #include "mission/config.hpp"
 #include "mission/record.hpp"
 #include "mission/roads.hpp"
+#include "mission/sensor_log.hpp"
 #include "nav/follow.hpp"
 #include "nav/localizer.hpp"
 
@@ -49,7 +50,15 @@ class Pilot {
 
   hal::Pose2 pose() const { return localizer_.pose(); }
   Eigen::Matrix3d covariance() const { return localizer_.covariance(); }
-  const GnssCounts& gnss() const { return gnss_; }
+  // The same without what correct() was told: wheels, IMU, satellites and map only.
+  hal::Pose2 pose_alone() const { return alone_.pose(); }
+  Eigen::Matrix3d covariance_alone() const { return alone_.covariance(); }
+  // Where the other scans, or the map, say that the robot stands, now.
+  nav::Correction correct(const hal::Pose2& pose, const Eigen::Matrix3d& covariance);
+  nav::Correction correct_by_map(const hal::Pose2& pose, const Eigen::Matrix3d& covariance);
+  double travelled_m() const { return travelled_m_; }
+  const GnssCounts& gnss() const { return sensors_.gnss(); }
+  SensorLog& sensors() { return sensors_; }
 
  private:
   static constexpr int kTriesMax = 3;
@@ -69,7 +78,8 @@ class Pilot {
   hal::Clock& clock_;
   hal::Devices& devices_;
   nav::Localizer localizer_;
-  GnssCounts gnss_;
+  nav::Localizer alone_;
+  SensorLog sensors_;
   double travelled_m_{};  // By the wheels, since the start.
 };
 

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "hal/values.hpp"
@@ -27,6 +28,31 @@ struct VoxelCounts {
   std::uint64_t boundary_unseen{};
 };
 
+// How a scan was laid over those before it.
+enum class ScanVerdict {
+  off,           // Not asked for.
+  alone,         // It overlaps no scan in hand: nothing to compare it with.
+  accepted,      // Fits those that it overlaps.
+  held_in_part,  // Fits, but some directions are left to the localizer.
+  refused        // Contradicts them: not merged.
+};
+std::string_view name(ScanVerdict verdict);
+
+// In figures of the pair that overlaps most, where there is one.
+struct ScanFit {
+  ScanVerdict verdict = ScanVerdict::off;
+  std::string reason;  // Why it was refused, or which directions are free.
+  int tries{};         // Guesses and scans that it took.
+  int references{};    // Scans that it fits.
+  double rms_m{};
+  double cloud_to_cloud_m{};
+  double overlap{};
+  double strength_shift{}, strength_turn{};  // Of the weakest direction, height and tilt included.
+  double moved_m{}, moved_rad{};             // From where the localizer had it.
+  double chi2{};                             // Of that, by both covariances; 3 numbers.
+  hal::Pose2 before;                         // Where the localizer had it.
+};
+
 struct ScanRecord {
   int number{};           // 1, 2, ...: scans/0001.ply
   bool next_best_view{};  // false: a station of Phase I
@@ -34,11 +60,13 @@ struct ScanRecord {
   std::string area;
   bool by_hand{};  // Placed by a person.
   hal::Pose2 planned;
-  hal::Pose2 believed;        // Where the localizer says the scan was taken.
-  double sigma_position_m{};  // Its own claim, 1-sigma.
+  hal::Pose2 believed;        // Where localizer and registration say the scan was taken.
+  double sigma_position_m{};  // Their own claim, 1-sigma.
   double sigma_heading_rad{};
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // Of (x m, y m, heading rad), in W.
-  std::optional<hal::Pose2> truth;                       // In simulation.
+  ScanFit fit;
+  hal::Time stamp{};                // Of the scan, by the robot's clock.
+  std::optional<hal::Pose2> truth;  // In simulation.
   double ground_z_m{};
   hal::ScanPattern pattern;  // Of its beams.
   double start_s{};          // Mission time.
@@ -53,6 +81,9 @@ struct ScanRecord {
   std::uint64_t resolved_voxels{};   // Of those, no longer unseen afterwards.
   VoxelCounts after;
   std::uint64_t visible_to_next{};  // Best tally after this scan: what the next view would see.
+
+  // Sets the covariance, and in two numbers what it says along its worse axis and of the heading.
+  void claim(const Eigen::Matrix3d& of_pose);
 };
 
 // A station that was planned and not scanned.
@@ -106,6 +137,17 @@ struct DensityFacts {
   std::uint64_t reached_voxels{};
 };
 
+// What registration did over the whole run.
+struct RegistrationCounts {
+  int accepted{}, held_in_part{}, alone{}, refused{};  // Scans, by their last verdict.
+  int retaken{};                                       // Scans that were taken again.
+  int unheard{};                       // Accepted ones that the localizer would not follow.
+  int map_matched{}, map_unmatched{};  // Scans of the robot whose walls were the map's.
+  int tours_closed{};
+  int pairs{}, pairs_odd{};               // When the last tour closed.
+  double moved_max_m{}, moved_max_rad{};  // Of any scan when a tour closed.
+};
+
 // Simulation only: the run judged by the world that it could not see.
 struct Truth {
   std::uint64_t surface_visible{};  // Surface voxels visible from some reachable ground cell.
@@ -114,6 +156,8 @@ struct Truth {
   double position_error_rms_m{};
   double heading_error_max_rad{};
   double nees_mean{};  // 3 expected when the covariance is honest.
+  // Where the localizer had the robot's scans before they were registered.
+  double before_error_max_m{}, before_error_max_rad{};
 };
 
 struct RunRecord {
@@ -139,6 +183,7 @@ struct RunRecord {
   bool looks_through_foliage{};
   double foliage_share_min{};
   GnssCounts gnss;
+  RegistrationCounts registration;
   double mission_s{};
   double driven_total_m{};
   std::vector<std::uint64_t> set_aside;       // SiteModel::voxels_set_aside at the end,

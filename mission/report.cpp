@@ -111,6 +111,28 @@ std::string overlap(const Facts& facts) {
           table);
 }
 
+std::string registration(const RunRecord& run) {
+  const std::string table = report::registration_table(run);
+  if (table.empty()) return "";
+  const RegistrationCounts& counts = run.registration;
+  std::string text = fmt::format(
+      "<p>{} scans fit those that they overlap, {} of them with directions left to the localizer; "
+      "{} overlap no other, {} were refused, {} were taken twice.",
+      counts.accepted + counts.held_in_part, counts.held_in_part, counts.alone, counts.refused,
+      counts.retaken);
+  if (counts.tours_closed > 0)
+    text += fmt::format(
+        " When a tour closed, {} pairs held the scans together ({} at odds left out), and moved "
+        "them by {} mm and {} deg at most.",
+        counts.pairs, counts.pairs_odd, number(1000 * counts.moved_max_m, 1),
+        number(counts.moved_max_rad * 180 / std::numbers::pi, 3));
+  return section("Registration",
+                 hint("Where scans stood, by laying them over each other. Figures of the pair that "
+                      "overlaps most; strength 1: surfaces face every way alike, 0: the scan could "
+                      "slide. Moved: from where the localizer had it.") +
+                     text + "</p>\n" + table);
+}
+
 std::string truth(const RunRecord& run) {
   if (!run.truth) return "";
   const Truth& judged = *run.truth;
@@ -203,6 +225,7 @@ std::string report_html(const RunRecord& record, const ProductFacts& products) {
                                "boundary unseen voxels that a next best view was predicted to "
                                "see, those no longer unseen.") +
                               report::scan_table(record));
+  out += registration(record);
   out += truth(record) + repairs(record) + files(record, products);
   out +=
       "<footer>Vantage survey report. Metres in the site frame: x east, y north, z up; headings "

@@ -146,6 +146,8 @@ AreaFacts area_facts(const RunRecord& record, const AreaPlan& plan) {
     const planning::Station& station = plan.cover.stations[i];
     facts.scan_of_station[i] = scan_of(record, plan, station);
     if (facts.scan_of_station[i] < 0) continue;
+    const auto scan = static_cast<std::size_t>(facts.scan_of_station[i]);
+    if (record.scans[scan].fit.verdict == ScanVerdict::refused) continue;  // Not merged.
     facts.covered.insert(facts.covered.end(), station.sees.begin(), station.sees.end());
   }
   return sum_up(plan, std::move(facts));

@@ -38,6 +38,7 @@ std::string gap_tables(const Facts& facts);
 std::string overlap_table(const Facts& facts);  // With the weak links below; empty without a plan.
 std::string station_table(const Facts& facts);
 std::string scan_table(const RunRecord& run);
+std::string registration_table(const RunRecord& run);  // Empty: none was registered.
 std::string pose_table(const RunRecord& run);
 std::string dropped_table(const RunRecord& run);
 

@@ -317,6 +317,38 @@ std::string scan_table(const RunRecord& run) {
   return table.empty() ? "<p>No scan was taken.</p>\n" : table.html();
 }
 
+std::string registration_table(const RunRecord& run) {
+  Table table({{"Scan"},
+               {"Name", Align::word},
+               {"Verdict", Align::word},
+               {"Fits scans"},
+               {"RMS mm"},
+               {"Cloud to cloud mm"},
+               {"Overlap"},
+               {"Strength, shift"},
+               {"Strength, turn"},
+               {"Moved mm"},
+               {"Moved deg"},
+               {"Tries"},
+               {"", Align::text}});
+  for (const ScanRecord& scan : run.scans) {
+    const ScanFit& fit = scan.fit;
+    if (fit.verdict == ScanVerdict::off) continue;
+    const bool has_pair = fit.rms_m > 0;
+    const auto figure = [&](double value, int decimals) {
+      return has_pair ? number(value, decimals) : std::string("-");
+    };
+    table.row({std::to_string(scan.number), scan_name(scan), std::string(name(fit.verdict)),
+               std::to_string(fit.references), figure(1000 * fit.rms_m, 1),
+               figure(1000 * fit.cloud_to_cloud_m, 0), has_pair ? percent(fit.overlap) : "-",
+               figure(fit.strength_shift, 2), figure(fit.strength_turn, 2),
+               figure(1000 * fit.moved_m, 1), has_pair ? degrees(fit.moved_rad, 3) : "-",
+               std::to_string(fit.tries), escaped(fit.reason)},
+              fit.verdict == ScanVerdict::refused ? "alarm" : "");
+  }
+  return table.empty() ? "" : table.html();
+}
+
 std::string pose_table(const RunRecord& run) {
   Table table({{"Scan"},
                {"Name", Align::word},

@@ -232,6 +232,13 @@ ScanEffect SiteModel::add(const hal::ScanCloud& scan,
   return effect;
 }
 
+void SiteModel::take_up(const SiteModel& before) {
+  tries_ = before.tries_;
+  set_aside_ = before.set_aside_;
+  excluded_ = before.excluded_;
+  density_.take_up(before.density_);
+}
+
 // How many layers were added to the box: up to the highest one that is kept and has enough returns
 // in it and above, so that a stray return adds none.
 int SiteModel::grow(const planning::InsertReport& report) {

@@ -82,6 +82,10 @@ class SiteModel {
   ScanEffect add(const hal::ScanCloud& scan, const std::vector<Eigen::Vector3f>& W_points_m,
                  const Eigen::Isometry3d& T_W_S, double ground_z_m);
 
+  // Before the first add(): takes up which views another model of the same site has tried and given
+  // up, though not what its scans showed.
+  void take_up(const SiteModel& before);
+
   // Every cell that a view may be asked for, and what it counts.
   std::vector<CellTally> tally();
   // The same from the best heading of each cell: what a view there would see.

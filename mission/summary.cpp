@@ -113,6 +113,22 @@ json::object seen_from_json(const ScanRecord& scan) {
           {"rows", pattern.rows}};
 }
 
+json::object fit_json(const ScanFit& fit) {
+  return {{"verdict", name(fit.verdict)},
+          {"reason", fit.reason},
+          {"tries", fit.tries},
+          {"references", fit.references},
+          {"rms_m", rounded(fit.rms_m, 4)},
+          {"cloud_to_cloud_m", rounded(fit.cloud_to_cloud_m, 4)},
+          {"overlap", rounded(fit.overlap, 4)},
+          {"strength_shift", rounded(fit.strength_shift, 4)},
+          {"strength_turn", rounded(fit.strength_turn, 4)},
+          {"moved_m", rounded(fit.moved_m, 4)},
+          {"moved_deg", degrees(fit.moved_rad)},
+          {"chi2", rounded(fit.chi2, 3)},
+          {"localizer", pose_json(fit.before)}};
+}
+
 json::object scan_json(const RunRecord& record, std::size_t index) {
   const ScanRecord& scan = record.scans[index];
   json::object object{{"number", scan.number},
@@ -124,6 +140,7 @@ json::object scan_json(const RunRecord& record, std::size_t index) {
                       {"believed", pose_json(scan.believed)},
                       {"sigma_position_m", rounded(scan.sigma_position_m, 4)},
                       {"sigma_heading_deg", degrees(scan.sigma_heading_rad)},
+                      {"registration", fit_json(scan.fit)},
                       {"truth", nullptr},
                       {"ground_z_m", mm(scan.ground_z_m)},
                       {"start_s", mm(scan.start_s)},
@@ -168,7 +185,9 @@ json::value truth_json(const std::optional<Truth>& truth) {
           {"position_error_max_m", rounded(truth->position_error_max_m, 4)},
           {"position_error_rms_m", rounded(truth->position_error_rms_m, 4)},
           {"heading_error_max_deg", degrees(truth->heading_error_max_rad)},
-          {"nees_mean", rounded(truth->nees_mean, 4)}};
+          {"nees_mean", rounded(truth->nees_mean, 4)},
+          {"before_registration_error_max_m", rounded(truth->before_error_max_m, 4)},
+          {"before_registration_error_max_deg", degrees(truth->before_error_max_rad)}};
 }
 
 json::object files_json(const ProductFacts& products) {
@@ -198,6 +217,22 @@ json::object counts_json(const RunRecord& record) {
 
 json::object gnss_json(const GnssCounts& gnss) {
   return {{"fixes", gnss.fixes}, {"refused", gnss.refused}, {"resets", gnss.resets}};
+}
+
+json::object registration_json(const RegistrationCounts& counts) {
+  return {{"accepted", counts.accepted},
+          {"held_in_part", counts.held_in_part},
+          {"alone", counts.alone},
+          {"refused", counts.refused},
+          {"retaken", counts.retaken},
+          {"not_followed_by_localizer", counts.unheard},
+          {"map_matched", counts.map_matched},
+          {"map_unmatched", counts.map_unmatched},
+          {"tours_closed", counts.tours_closed},
+          {"pairs", counts.pairs},
+          {"pairs_at_odds", counts.pairs_odd},
+          {"moved_max_m", rounded(counts.moved_max_m, 4)},
+          {"moved_max_deg", degrees(counts.moved_max_rad)}};
 }
 
 json::object sensor_json(const ScannerConfig& scanner) {
@@ -233,7 +268,8 @@ json::object summarise(const RunRecord& record, const ProductFacts& products) {
                        {"driven_m", mm(record.driven_total_m)},
                        {"voxel_m", record.voxel_m},
                        {"gain_min_voxels", record.gain_min_voxels},
-                       {"gnss", gnss_json(record.gnss)}};
+                       {"gnss", gnss_json(record.gnss)},
+                       {"registration", registration_json(record.registration)}};
   summary["sensor"] = sensor_json(record.scanner);
   summary["radius_m"] = record.radius_m;
   summary["margin_m"] = record.margin_m;

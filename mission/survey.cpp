@@ -2,11 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <boost/system/system_error.hpp>
-#include <numbers>
 
 #include "hal/together.hpp"
+#include "mission/json_text.hpp"
 
 namespace mission {
 namespace {
@@ -28,25 +27,12 @@ bool is_hopeless(boost::system::error_code error) {
   return error == errc::invalid_argument || error == errc::argument_out_of_domain;
 }
 
-json::object pose_json(const hal::Pose2& pose) {
-  return {{"x_m", pose.position_m.x()},
-          {"y_m", pose.position_m.y()},
-          {"heading_deg", pose.heading_rad * 180 / std::numbers::pi}};
-}
-
-// The covariance in two numbers: along the worse axis, and of the heading.
-void note_sigmas(ScanRecord& scan) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(scan.covariance.topLeftCorner<2, 2>());
-  scan.sigma_position_m = std::sqrt(axes.eigenvalues().maxCoeff());
-  scan.sigma_heading_rad = std::sqrt(scan.covariance(2, 2));
-}
-
 json::object plan_json(const AreaPlan& plan) {
   json::array stations;
   for (const int s : plan.tour) {
     const planning::Station& station = plan.cover.stations[static_cast<std::size_t>(s)];
     json::object entry{{"name", station_name(plan, s)}};
-    for (const auto& [key, value] : pose_json(pose_of(station.at))) entry[key] = value;
+    for (const auto& [key, value] : exact_json(pose_of(station.at))) entry[key] = value;
     entry["sees_m"] = station.sees_m;
     entry["adds_m"] = station.adds_m;
     entry["overlaps_m"] = station.overlaps_m;
@@ -82,7 +68,11 @@ Survey::Survey(const MissionConfig& config, const nav::SiteMap& map, SiteTasks t
       parts_(parts),
       began_(parts.clock.now()),
       pilot_(config.robot, parts.clock, parts.devices, tasks_.start),
-      model_(config, map, tasks_.tasks, threads) {
+      model_(std::make_unique<SiteModel>(config, map, tasks_.tasks, threads)),
+      matcher_(config.localize.match_map ? std::make_unique<MapMatcher>(map, config.robot.scanner)
+                                         : nullptr),
+      registrar_(config.registration, config.robot.scanner, threads),
+      spool_(ScanSpool::open(parts.store.folder()).value()) {
   record_.mission = config.name;
   record_.site = map.name;
   record_.robot = config.robot.name;
@@ -92,7 +82,7 @@ Survey::Survey(const MissionConfig& config, const nav::SiteMap& map, SiteTasks t
   record_.scanner = config.robot.scanner;
   record_.radius_m = config.robot.body.radius_m;
   record_.margin_m = config.margin_m;
-  record_.grid = model_.map().grid();
+  record_.grid = model_->map().grid();
   layers_at_first_ = record_.grid.nz;
   record_.voxel_m = config.phase2.voxel_m;
   record_.gain_min_voxels = config.phase2.gain_min_voxels;
@@ -115,10 +105,12 @@ hal::Task<void> Survey::run() {
     failure = std::current_exception();
   }
   record_.mission_s = now_s();
+  note_sensors();
   note_gnss();
-  record_.set_aside = model_.voxels_set_aside();
-  record_.thin_set_aside = model_.thin_set_aside();
-  record_.foliage = model_.foliage();
+  note_registration();
+  record_.set_aside = model_->voxels_set_aside();
+  record_.thin_set_aside = model_->thin_set_aside();
+  record_.foliage = model_->foliage();
   decide({{"t_s", now_s()},
           {"decision", "end"},
           {"completed", record_.completed},
@@ -130,6 +122,7 @@ hal::Task<void> Survey::survey() {
   co_await plan_stations();
   for (std::size_t t = 0; t < record_.plans.size(); ++t) co_await tour(t);
   if (record_.scans.empty()) throw CannotGoOn(why_no_scan());
+  co_await close_tour();
   co_await refine();
   co_await go_home();
   note_box();
@@ -149,19 +142,19 @@ std::string Survey::why_no_scan() const {
 
 // A box that is too low hides what the scans saw above it: the operator has to know.
 void Survey::note_box() {
-  const planning::VoxelGrid& grid = model_.map().grid();
+  const planning::VoxelGrid& grid = model_->map().grid();
   if (grid.nz > layers_at_first_)
     record_.notes.push_back(
         fmt::format("scans saw higher than the voxel box: it grew from {} to {} layers of {} m",
                     layers_at_first_, grid.nz, grid.voxel_m));
-  if (const std::uint64_t above = model_.points_above_box(); above > 0)
+  if (const std::uint64_t above = model_->points_above_box(); above > 0)
     record_.notes.push_back(fmt::format(
         "{} points above the voxel box were left out: it grows for {} points in a layer or above, "
         "up to [phase2] height_max_m = {} m",
         above, SiteModel::kReturnsToGrow, config_.phase2.height_max_m));
   std::uint64_t points = 0;
   for (const ScanRecord& scan : record_.scans) points += scan.points;
-  const std::uint64_t outside = model_.points_outside_box();
+  const std::uint64_t outside = model_->points_outside_box();
   if (outside * 1000 > points)
     record_.notes.push_back(fmt::format(
         "{} of {} points lie outside the voxel box: raise [phase2] height_max_m or margin_m",
@@ -182,6 +175,15 @@ void Survey::note_gnss() {
         "the localizer was lost {} times and started again from satellite fixes: check the scans "
         "taken before against their neighbours",
         resets));
+  const hal::Time now = parts_.clock.now();
+  for (const auto& [sensor, word, meanwhile] :
+       {std::tuple(SensorLog::Sensor::gnss, "satellites were not seen",
+                   "wheels, IMU and scans told the way"),
+        std::tuple(SensorLog::Sensor::imu, "the IMU was silent", "the wheels told the turns")})
+    if (const int losses = pilot_.sensors().losses(sensor); losses > 0)
+      record_.notes.push_back(fmt::format("{} {} times, for {:.0f} s in all; {} meanwhile", word,
+                                          losses, pilot_.sensors().silent_s(sensor, now),
+                                          meanwhile));
 }
 
 hal::Task<void> Survey::plan_stations() {
@@ -225,12 +227,17 @@ hal::Task<void> Survey::refine() {
     std::vector<NextView> views;
     const std::function<void()> look = [&] { views = choose_views(); };
     co_await parts_.compute.run(look);
+    if (views.empty() && scans_closed_ < static_cast<int>(record_.scans.size())) {
+      co_await close_tour();
+      continue;  // The map may show something worth seeing now.
+    }
     if (views.empty()) {
       std::string reason =
           fmt::format("no next best view would see {} or more unseen voxels (the best sees {})",
-                      config_.phase2.gain_min_voxels, model_.best_voxels());
-      if (model_.set_aside() > 0)
-        reason += fmt::format("; {} voxels stayed unseen after two tries each", model_.set_aside());
+                      config_.phase2.gain_min_voxels, model_->best_voxels());
+      if (model_->set_aside() > 0)
+        reason +=
+            fmt::format("; {} voxels stayed unseen after two tries each", model_->set_aside());
       co_await leave(std::move(reason), true);
       co_return;
     }
@@ -238,11 +245,13 @@ hal::Task<void> Survey::refine() {
     views_taken_ += done;
     const bool some_not_faced = config_.phase2.choose == "gain" && !views.empty();
     if (!done && !some_not_faced) {
+      co_await close_tour();
       std::string reason = "none of the views that would add enough can be reached";
       co_await leave(std::move(reason), false);
       co_return;
     }
   }
+  co_await close_tour();
   std::string reason = fmt::format("took views_max = {} next best views", config_.phase2.views_max);
   co_await leave(std::move(reason), false);
 }
@@ -258,7 +267,7 @@ hal::Task<bool> Survey::take_best_of(std::vector<NextView>& views) {
     if (!chosen) co_return false;
     const NextView view = views[*chosen];
     views.erase(views.begin() + static_cast<std::ptrdiff_t>(*chosen));
-    model_.exclude(view.cell.voxel);
+    model_->exclude(view.cell.voxel);
     const Stop stop{.name = fmt::format("NBV {}", views_taken_ + 1),
                     .task = view.cell.task,
                     .pose = view.pose,
@@ -326,26 +335,33 @@ hal::Task<bool> Survey::carry(const Stop& stop, ScanRecord& scan) {
   scan.believed = placed->pose;
   const Eigen::Vector3d sigmas{placed->position_sigma_m, placed->position_sigma_m,
                                placed->heading_sigma_rad};
-  scan.covariance = sigmas.cwiseAbs2().asDiagonal();
-  note_sigmas(scan);
+  scan.claim(sigmas.cwiseAbs2().asDiagonal());
   co_return true;
 }
 
+// Takes the scan and lays it over the others; one that contradicts them is taken once more.
 hal::Task<bool> Survey::acquire(const Stop& stop, ScanRecord scan) {
   scan.number = static_cast<int>(record_.scans.size()) + 1;
   scan.start_s = now_s();
-  const std::optional<hal::ScanCloud> cloud = co_await take_scan(stop);
-  if (!cloud) co_return false;
-  scan.end_s = now_s();
-  if (!scan.by_hand) {
-    // The localizer has used the time: this pose is better than the one on arrival.
-    scan.believed = pilot_.pose();
-    scan.covariance = pilot_.covariance();
-    note_sigmas(scan);
+  const int takes = config_.registration.scans && config_.registration.retake ? 2 : 1;
+  for (int take = 1;; ++take) {
+    const std::optional<hal::ScanCloud> cloud = co_await take_scan(stop);
+    if (!cloud) co_return false;
+    scan.end_s = now_s();
+    scan.stamp = cloud->stamp;
+    note_sensors();
+    co_await match_map(*cloud, scan);
+    const ScanBelief belief = note_pose(scan);
+    const std::function<void()> fit = [&] { register_scan(*cloud, belief, scan, take == takes); };
+    co_await parts_.compute.run(fit);
+    const bool again = scan.fit.verdict == ScanVerdict::refused && take < takes;
+    note_verdict(scan, again);
+    if (again) continue;
+    tell_localizer(scan);
+    const std::function<void()> work = [&] { merge(*cloud, stop, scan); };
+    co_await parts_.compute.run(work);
+    co_return true;
   }
-  const std::function<void()> work = [&] { merge(*cloud, stop, scan); };
-  co_await parts_.compute.run(work);
-  co_return true;
 }
 
 // A few tries. Nothing: the stop is dropped, with the reason. Throws when it must be expected that
@@ -372,6 +388,7 @@ hal::Task<std::optional<hal::ScanCloud>> Survey::take_scan(const Stop& stop) {
   co_return std::nullopt;
 }
 
+// A scan that contradicts the others is kept, and not merged: what it alone saw stays unseen.
 void Survey::merge(const hal::ScanCloud& cloud, const Stop& stop, ScanRecord& scan) {
   const Eigen::Isometry3d T_W_S =
       scanner_pose(scan.believed, scan.ground_z_m, config_.robot.scanner.height_m);
@@ -382,25 +399,21 @@ void Survey::merge(const hal::ScanCloud& cloud, const Stop& stop, ScanRecord& sc
           W_points_m, T_W_S,
           {.number = scan.number, .station = scan.name, .time_s = scan.end_s, .seed = config_.seed})
       .value();
-  cloud_.add(W_points_m);
-  if (stop.view) {
-    model_.expect(*stop.view);
-    scan.predicted_voxels = stop.view->voxels;
-  }
-  const ScanEffect effect = model_.add(cloud, W_points_m, T_W_S, scan.ground_z_m);
-  if (stop.view) scan.resolved_voxels = model_.settle();
+  ScanEffect effect;
+  if (scan.fit.verdict != ScanVerdict::refused)
+    effect = insert(cloud, W_points_m, T_W_S, stop, scan);
   scan.beams = cloud.pattern.beams();
   scan.pattern = cloud.pattern;
   scan.points = W_points_m.size();
   scan.points_outside_box = effect.points_outside_box;
-  scan.after = model_.counts();
-  record_.grid = model_.map().grid();  // May have grown.
-  close_roads(effect.new_obstacles_m);
+  scan.after = model_->counts();
+  record_.grid = model_->map().grid();  // May have grown.
   decide({{"t_s", now_s()},
           {"decision", "scan"},
           {"number", scan.number},
           {"name", scan.name},
-          {"believed", pose_json(scan.believed)},
+          {"merged", scan.fit.verdict != ScanVerdict::refused},
+          {"believed", exact_json(scan.believed)},
           {"sigma_position_m", scan.sigma_position_m},
           {"points", scan.points},
           {"seen_occupied", scan.after.seen_occupied},
@@ -414,6 +427,21 @@ void Survey::merge(const hal::ScanCloud& cloud, const Stop& stop, ScanRecord& sc
   record_.scans.push_back(std::move(scan));
 }
 
+ScanEffect Survey::insert(const hal::ScanCloud& cloud,
+                          const std::vector<Eigen::Vector3f>& W_points_m,
+                          const Eigen::Isometry3d& T_W_S, const Stop& stop, ScanRecord& scan) {
+  if (config_.registration.scans && config_.registration.tour_end) spool_.put(cloud).value();
+  cloud_.add(W_points_m);
+  if (stop.view) {
+    model_->expect(*stop.view);
+    scan.predicted_voxels = stop.view->voxels;
+  }
+  ScanEffect effect = model_->add(cloud, W_points_m, T_W_S, scan.ground_z_m);
+  if (stop.view) scan.resolved_voxels = model_->settle();
+  close_roads(effect.new_obstacles_m);
+  return effect;
+}
+
 // What the scans show and the map lacks closes the robot's roads through it.
 void Survey::close_roads(const std::vector<Eigen::Vector2d>& obstacles_m) {
   if (tasks_.start_area < 0) return;
@@ -425,7 +453,7 @@ void Survey::drop(const Stop& stop, const std::string& reason) {
   decide({{"t_s", now_s()},
           {"decision", "drop"},
           {"name", stop.name},
-          {"at", pose_json(stop.pose)},
+          {"at", exact_json(stop.pose)},
           {"reason", reason}});
 }
 

@@ -2,6 +2,7 @@
 // best views until none would add enough.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,11 +11,14 @@
 #include "hal/compute.hpp"
 #include "hal/devices.hpp"
 #include "mission/config.hpp"
+#include "mission/map_match.hpp"
 #include "mission/pilot.hpp"
 #include "mission/plan.hpp"
 #include "mission/ply.hpp"
 #include "mission/progress.hpp"
 #include "mission/record.hpp"
+#include "mission/scan_registrar.hpp"
+#include "mission/scan_spool.hpp"
 #include "mission/site_model.hpp"
 #include "mission/store.hpp"
 
@@ -43,7 +47,7 @@ class Survey {
 
   const RunRecord& record() const { return record_; }
   RunRecord& record() { return record_; }
-  const SiteModel& model() const { return model_; }
+  const SiteModel& model() const { return *model_; }
   const CloudMerger& cloud() const { return cloud_; }
 
  private:
@@ -65,6 +69,22 @@ class Survey {
   hal::Task<bool> acquire(const Stop& stop, ScanRecord scan);
   hal::Task<std::optional<hal::ScanCloud>> take_scan(const Stop& stop);
   void merge(const hal::ScanCloud& cloud, const Stop& stop, ScanRecord& scan);
+  ScanEffect insert(const hal::ScanCloud& cloud, const std::vector<Eigen::Vector3f>& W_points_m,
+                    const Eigen::Isometry3d& T_W_S, const Stop& stop, ScanRecord& scan);
+
+  // survey_register.cpp
+  ScanBelief note_pose(ScanRecord& scan) const;
+  hal::Task<void> match_map(const hal::ScanCloud& cloud, const ScanRecord& scan);
+  void note_sensors();
+  void register_scan(const hal::ScanCloud& cloud, const ScanBelief& belief, ScanRecord& scan,
+                     bool last);
+  void try_to_register(const ScanBelief& belief, ScanRecord& scan, bool other_guesses);
+  void tell_localizer(const ScanRecord& scan);
+  void note_verdict(const ScanRecord& scan, bool again);
+  hal::Task<void> close_tour();
+  bool fit_tour();
+  void fill_anew();
+  void note_registration();
 
   std::vector<NextView> choose_views();
   std::optional<std::size_t> choose_view(std::vector<NextView>& views,
@@ -87,9 +107,16 @@ class Survey {
   const hal::Time began_;
   std::string stop_reason_;
   Pilot pilot_;
-  SiteModel model_;
-  int layers_at_first_{};     // Of its voxel box.
-  std::vector<Roads> roads_;  // One per planned task, in order.
+  std::unique_ptr<SiteModel> model_;
+  std::unique_ptr<MapMatcher> matcher_;  // Null: not asked for.
+  ScanRegistrar registrar_;
+  ScanAttempt attempt_;          // Of the scan that is being registered.
+  ScanSpool spool_;              // Of the scans merged.
+  int scans_closed_{};           // In the map as the last closed tour has them.
+  int last_by_robot_ = -1;       // Index of a scan,
+  double last_by_robot_at_m_{};  // and the way travelled until then.
+  int layers_at_first_{};        // Of its voxel box.
+  std::vector<Roads> roads_;     // One per planned task, in order.
   std::size_t stations_planned_{};
   std::size_t stations_done_{};
   int views_taken_{};

@@ -18,8 +18,8 @@ json::array xy(const Eigen::Vector2d& p) {
 
 // What is left when no more views are taken, and whether any could have helped.
 void Survey::note_leftover(bool stopped_for_gain) {
-  record_.leftover = model_.leftover();
-  record_.density = model_.density();
+  record_.leftover = model_->leftover();
+  record_.density = model_->density();
   const Leftover& left = *record_.leftover;
   const planning::StopCertificate& certificate = left.certificate;
   if (stopped_for_gain) record_.end += "; " + in_words(left);
@@ -33,13 +33,13 @@ void Survey::note_leftover(bool stopped_for_gain) {
 }
 
 std::vector<NextView> Survey::choose_views() {
-  std::vector<NextView> views = model_.next_views();
-  if (!record_.scans.empty()) record_.scans.back().visible_to_next = model_.best_voxels();
+  std::vector<NextView> views = model_->next_views();
+  if (!record_.scans.empty()) record_.scans.back().visible_to_next = model_->best_voxels();
   json::array ahead;
-  for (const ViewAhead& view : model_.views_ahead(
-           model_.last_tally(), static_cast<std::size_t>(config_.phase2.views_ahead))) {
+  for (const ViewAhead& view : model_->views_ahead(
+           model_->last_tally(), static_cast<std::size_t>(config_.phase2.views_ahead))) {
     json::object object{{"area", task(view.cell.task).area.name},
-                        {"at_m", xy(model_.cell_position_m(view.cell).head<2>())},
+                        {"at_m", xy(model_->cell_position_m(view.cell).head<2>())},
                         {"sees_voxels", view.sees_voxels},
                         {"adds_voxels", view.adds_voxels}};
     if (config_.robot.scanner.fov_deg < 360) object["heading_rad"] = view.heading_rad;
@@ -47,7 +47,7 @@ std::vector<NextView> Survey::choose_views() {
   }
   decide({{"t_s", now_s()},
           {"decision", "next_best_view"},
-          {"best_voxels", model_.best_voxels()},
+          {"best_voxels", model_->best_voxels()},
           {"gain_min_voxels", config_.phase2.gain_min_voxels},
           {"views_above", std::ranges::count_if(views, &NextView::faced)},
           {"ahead", std::move(ahead)}});
@@ -62,7 +62,7 @@ std::optional<std::size_t> Survey::choose_view(std::vector<NextView>& views,
   const ViewTimes times(config_, tasks_, roads, from_m);
   const auto chosen = choose(
       views, times, config_.phase2.choose == "gain_per_minute",
-      [this](NextView& view) { model_.face(view); },
+      [this](NextView& view) { model_->face(view); },
       static_cast<std::uint32_t>(config_.phase2.gain_min_voxels));
   if (!chosen) return std::nullopt;
   const NextView& view = views[chosen->view];
