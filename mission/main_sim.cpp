@@ -230,7 +230,7 @@ void SimBackend::judge_poses(RunRecord& record, Truth& truth) const {
           std::max(truth.before_error_max_m, (before.position_m - at.at.pose.position_m).norm());
       truth.before_error_max_rad =
           std::max(truth.before_error_max_rad,
-                   std::abs(wrapped(before.heading_rad - at.at.pose.heading_rad)));
+                   std::abs(hal::wrapped(before.heading_rad - at.at.pose.heading_rad)));
     }
     nees += error.dot(scan.covariance.ldlt().solve(error));
   }
