@@ -96,11 +96,14 @@ class Line {
 
 class Step {
  public:
-  Step(const FollowConfig& config, FollowState& state, const Path& path, const hal::Pose2& pose)
-      : config_(config), state_(state), path_(path), pose_(pose), line_(path) {}
+  Step(const FollowConfig& config, FollowState& state, const Path& path, const hal::Pose2& pose,
+       double cap_mps)
+      : config_(config), state_(state), path_(path), pose_(pose), cap_mps_(cap_mps), line_(path) {}
 
   hal::Twist run() {
     if (done(state_)) return stop();
+    state_.goal_distance_m = goal_distance_m();
+    state_.goal_heading_off_rad = std::abs(heading_off_rad());
     if (state_.leg < 0) begin_leg(0);
     hal::Twist twist;
     switch (state_.phase) {
@@ -117,14 +120,37 @@ class Step {
     }
     watch();
     if (done(state_)) return stop();
+    twist = limited(twist);
     state_.speed_mps = twist.forward_mps;
+    state_.turn_radps = twist.turn_radps;
     return twist;
   }
 
  private:
   hal::Twist stop() {
-    state_.speed_mps = 0;
+    state_.speed_mps = state_.turn_radps = 0;
     return {};
+  }
+
+  // The forward speed that comes nearest to what is wanted and can be had one period from the last.
+  double reachable_mps(double wanted_mps) const {
+    const double capped_mps = std::clamp(wanted_mps, -cap_mps_, cap_mps_);
+    const double v = state_.speed_mps;
+    const double faster_mps = config_.accel_max_mps2 * config_.period_s;
+    const double slower_mps = config_.brake_max_mps2 * config_.period_s;
+    return std::clamp(capped_mps, v > 0 ? v - slower_mps : v - faster_mps,
+                      v < 0 ? v + slower_mps : v + faster_mps);
+  }
+
+  hal::Twist limited(const hal::Twist& wanted) const {
+    const double most_radps = config_.turn_accel_max_radps2 * config_.period_s;
+    const double w = state_.turn_radps;
+    return {reachable_mps(wanted.forward_mps),
+            std::clamp(wanted.turn_radps, w - most_radps, w + most_radps)};
+  }
+
+  double heading_off_rad() const {
+    return path_.final_heading_rad ? hal::wrapped(*path_.final_heading_rad - pose_.heading_rad) : 0;
   }
 
   double goal_distance_m() const { return (line_.point(line_.last()) - pose_.position_m).norm(); }
@@ -185,7 +211,7 @@ class Step {
     }
     enter(FollowPhase::driving);
     const double curvature = 2 * std::sin(off_rad) / std::max(to_target.norm(), 0.1);
-    const double speed_mps = regulated_mps(std::abs(curvature), rest_m);
+    const double speed_mps = reachable_mps(regulated_mps(std::abs(curvature), rest_m));
     const double most_radps = config_.turn_max_radps;
     return {speed_mps, std::clamp(speed_mps * curvature, -most_radps, most_radps)};
   }
@@ -230,7 +256,7 @@ class Step {
 
   // In place; brakes first.
   hal::Twist turn(double off_rad) const {
-    const double brake_mps = 2 * config_.accel_max_mps2 * config_.period_s;
+    const double brake_mps = config_.brake_max_mps2 * config_.period_s;
     const double v = state_.speed_mps;
     if (std::abs(v) > brake_mps) return {v > 0 ? v - brake_mps : v + brake_mps, 0};
     const double gain = std::min(kTurnGain, 0.5 / config_.period_s);
@@ -258,8 +284,7 @@ class Step {
   }
 
   hal::Twist align() {
-    const double off_rad =
-        path_.final_heading_rad ? hal::wrapped(*path_.final_heading_rad - pose_.heading_rad) : 0;
+    const double off_rad = heading_off_rad();
     if (std::abs(off_rad) > config_.heading_tolerance_rad * 0.6) return turn(off_rad);
     state_.in_tolerance = goal_distance_m() <= config_.position_tolerance_m;
     if (!state_.in_tolerance && state_.corrections < config_.corrections_max) {
@@ -275,6 +300,7 @@ class Step {
   // it is: the robot stands as near as it can.
   void watch() {
     if (done(state_)) return;
+    if (cap_mps_ < config_.crawl_mps && state_.phase != FollowPhase::aligning) return;  // Held.
     bool better = false;
     if (state_.phase == FollowPhase::correcting) {
       better = goal_distance_m() < state_.progress_mark - kCorrectionProgressMinM;
@@ -295,6 +321,7 @@ class Step {
   FollowState& state_;
   const Path& path_;
   const hal::Pose2& pose_;
+  const double cap_mps_;
   const Line line_;
 };
 
@@ -325,8 +352,8 @@ Path path_along(const Route& route, std::optional<double> final_heading_rad) {
 }
 
 hal::Twist follow(const FollowConfig& config, FollowState& state, const Path& path,
-                  const hal::Pose2& pose) {
-  return Step(config, state, path, pose).run();
+                  const hal::Pose2& pose, double cap_mps) {
+  return Step(config, state, path, pose, cap_mps).run();
 }
 
 hal::Twist follow(const FollowConfig& config, FollowState& state, const Route& route,

@@ -2,6 +2,7 @@
 // approach.
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -25,7 +26,9 @@ struct FollowConfig {
   double period_s = 0.05;  // Between two calls.
   double speed_max_mps = 1.0;
   double turn_max_radps = 0.785;
-  double accel_max_mps2 = 0.5;    // Speeding up and braking.
+  double accel_max_mps2 = 0.5;  // Speeding up, and braking where it is foreseen.
+  double brake_max_mps2 = 1.0;  // Braking at all.
+  double turn_accel_max_radps2 = 2.0;
   double lateral_max_mps2 = 0.4;  // In curves.
   double robot_radius_m = 0.5;
   double clearance_full_m = 0.3;  // Beyond the radius: from here on full speed, at none a crawl.
@@ -60,6 +63,10 @@ struct FollowState {
   double remaining_m{};    // Along the path.
   double cross_track_m{};  // Distance from the path.
   double speed_mps{};      // Commanded last.
+  double turn_radps{};     // The same.
+  // How far pose and goal are apart; once arrived, how near the robot came to it.
+  double goal_distance_m{};
+  double goal_heading_off_rad{};  // Never negative; 0 where any heading will do.
 
   // For follow() only.
   int leg{-1};  // First vertex of the present leg; legs meet in sharp corners.
@@ -74,9 +81,13 @@ inline bool done(const FollowState& state) {
 }
 
 // One control step: what to command for one period. |forward| <= speed_max and |turn| <= turn_max;
-// backwards only at a crawl, to correct the last centimetres.
+// backwards only at a crawl, to correct the last centimetres. From step to step neither changes by
+// more than the config allows in a period, but that the twist is zero at once when it is done.
+//
+// Somebody who watches for obstacles sets `cap_mps`, the fastest forwards or backwards: the robot
+// brakes to it. As long as it is held so, it does not count as stalled.
 hal::Twist follow(const FollowConfig& config, FollowState& state, const Path& path,
-                  const hal::Pose2& pose);
+                  const hal::Pose2& pose, double cap_mps = std::numeric_limits<double>::infinity());
 // The same along a route, to the goal's heading.
 hal::Twist follow(const FollowConfig& config, FollowState& state, const Route& route,
                   const hal::Pose2& goal, const hal::Pose2& pose);

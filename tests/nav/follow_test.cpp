@@ -61,8 +61,19 @@ struct Drive {
   double goal_m{};
   double heading_rad{};
   bool limits_kept = true;
+  bool changes_kept = true;  // From step to step.
   bool monotone = true;
 };
+
+bool change_is_kept(const FollowConfig& config, const Twist& before, const Twist& twist) {
+  const double most_mps =
+      std::max(config.accel_max_mps2, config.brake_max_mps2) * config.period_s + 1e-9;
+  const double faster_mps = config.accel_max_mps2 * config.period_s + 1e-9;
+  return std::abs(twist.forward_mps - before.forward_mps) <= most_mps &&
+         std::abs(twist.forward_mps) - std::abs(before.forward_mps) <= faster_mps &&
+         std::abs(twist.turn_radps - before.turn_radps) <=
+             config.turn_accel_max_radps2 * config.period_s + 1e-9;
+}
 
 double distance_to_path(const Path& path, const Vector2d& p) {
   double least_m = (path.points_m.front() - p).norm();
@@ -83,6 +94,7 @@ bool near_corner(const Path& path, const Vector2d& p) {
 
 Drive drive(const FollowConfig& config, const Path& path, Rig& rig, double time_max_s) {
   Drive run;
+  Twist before;
   while (run.time_s < time_max_s && !done(run.state)) {
     const double progress_m = run.state.progress_m;
     const Twist twist = follow(config, run.state, path, rig.believed());
@@ -90,6 +102,9 @@ Drive drive(const FollowConfig& config, const Path& path, Rig& rig, double time_
     run.limits_kept = run.limits_kept && std::abs(twist.forward_mps) <= config.speed_max_mps &&
                       std::abs(twist.turn_radps) <= config.turn_max_radps &&
                       twist.forward_mps >= -config.crawl_mps;
+    run.changes_kept =
+        run.changes_kept && (done(run.state) || change_is_kept(config, before, twist));
+    before = twist;
     rig.drive(twist, config.period_s);
     const double off_m = distance_to_path(path, rig.truth.position_m);
     double& worst_m = near_corner(path, rig.truth.position_m) ? run.worst_corner_m : run.worst_m;
@@ -132,6 +147,10 @@ void expect_arrived(const Drive& run, const FollowConfig& config, std::uint64_t 
   EXPECT_LE(run.goal_m, config.position_tolerance_m + 0.015) << "seed " << seed;
   EXPECT_LE(run.heading_rad, config.heading_tolerance_rad + 0.008) << "seed " << seed;
   EXPECT_TRUE(run.limits_kept) << "seed " << seed;
+  EXPECT_TRUE(run.changes_kept) << "seed " << seed;
+  // What it says of how near it came is what it believed: centimetres from the truth.
+  EXPECT_NEAR(run.state.goal_distance_m, run.goal_m, 0.03) << "seed " << seed;
+  EXPECT_NEAR(run.state.goal_heading_off_rad, run.heading_rad, 0.012) << "seed " << seed;
   EXPECT_TRUE(run.monotone) << "seed " << seed;
 }
 
@@ -245,6 +264,52 @@ TEST(Follow, BrakesInTimeAtTheGoal) {
   }
   EXPECT_EQ(state.phase, FollowPhase::arrived);
   EXPECT_LT(overshoot_m, 0.03);
+}
+
+// Somebody who sees obstacles caps the speed, at random and down to a stand.
+TEST(Follow, KeepsBelowTheCapAndArrivesWhenItIsLifted) {
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    Rig rig(seed);
+    const FollowConfig config;
+    const Path path = random_path(rig.dice, 40);
+    FollowState state;
+    Twist before;
+    double cap_mps = 1, time_s = 0;
+    for (; time_s < 900 && !done(state); time_s += config.period_s) {
+      if (rig.dice.below(100) == 0) cap_mps = std::max(0.0, rig.dice.uniform(-0.3, 1));
+      if (time_s > 300) cap_mps = 1;
+      const Twist twist = follow(config, state, path, rig.believed(), cap_mps);
+      const double braked_mps =
+          std::max(cap_mps, std::abs(before.forward_mps) - config.brake_max_mps2 * config.period_s);
+      EXPECT_LE(std::abs(twist.forward_mps), braked_mps + 1e-9) << "seed " << seed;
+      EXPECT_TRUE(done(state) || change_is_kept(config, before, twist)) << "seed " << seed;
+      before = twist;
+      rig.drive(twist, config.period_s);
+    }
+    EXPECT_EQ(state.phase, FollowPhase::arrived) << "seed " << seed << " " << name(state.phase);
+  }
+}
+
+TEST(Follow, WaitsWithoutEndWhileItIsHeld) {
+  FollowState state;
+  const Path path{{{0, 0}, {20, 0}}, {}, std::nullopt};
+  for (int ticks = 0; ticks < 10000; ++ticks)
+    EXPECT_EQ(follow({}, state, path, {{0, 0}, 0}, 0).forward_mps, 0);
+  EXPECT_FALSE(done(state));
+}
+
+// The last half metre is out of reach: the wheels turn, the robot stays.
+TEST(Follow, SaysHowNearItCameWhereTheGoalCannotBeReached) {
+  Rig rig(3, false);
+  const Path path{{{0, 0}, {10, 0}}, {}, 0.0};
+  FollowState state;
+  for (int ticks = 0; ticks < 10000 && !done(state); ++ticks) {
+    rig.drive(follow({}, state, path, rig.believed()), FollowConfig{}.period_s);
+    rig.truth.position_m.x() = std::min(rig.truth.position_m.x(), 9.9);
+  }
+  EXPECT_TRUE(done(state));
+  EXPECT_FALSE(state.in_tolerance);
+  EXPECT_NEAR(state.goal_distance_m, 0.1, 0.01);
 }
 
 TEST(Follow, OnlyTurnsWhenItStandsAtTheGoal) {
