@@ -1,6 +1,7 @@
 #include "sim/cast_ahead.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace sim {
 namespace {
@@ -40,8 +41,33 @@ std::span<const float> CastAhead::of(std::uint64_t number) {
     key_ = key;
     cast(number);
   }
-  return std::span<const float>(ranges_m_).subspan((number - turns_.front().number) * arc_.beams,
-                                                   arc_.beams);
+  const auto ranges_m = std::span<const float>(ranges_m_).subspan(
+      (number - turns_.front().number) * arc_.beams, arc_.beams);
+  return world_.people().empty() ? ranges_m : with_people(number, ranges_m);
+}
+
+// People walk on while what stands was cast: they are put in as they are now.
+std::span<const float> CastAhead::with_people(std::uint64_t number,
+                                              std::span<const float> ranges_m) {
+  const MirrorTurn& turn = turns_[number - turns_.front().number];
+  const Eigen::Isometry3d T_W_S = key_->at.T_W_S(world_.config().scanner.height_m);
+  among_people_m_.assign(ranges_m.begin(), ranges_m.end());
+  for (std::uint32_t i = 0; i < arc_.beams; ++i) {
+    const double pan_rad =
+        turn.pan_first_rad + (turn.pan_end_rad - turn.pan_first_rad) * i / arc_.beams;
+    const Eigen::Isometry3d T_W_L =
+        T_W_S * Eigen::AngleAxisd(pan_rad, Eigen::Vector3d::UnitZ()) * config_.T_P_L;
+    const double angle_rad = arc_.angle_first_rad + i * arc_.angle_step_rad;
+    const Eigen::Vector3d W_direction =
+        T_W_L.linear() * Eigen::Vector3d(std::cos(angle_rad), std::sin(angle_rad), 0);
+    const double range_m = world_.range_to_people_m(T_W_L.translation(), W_direction);
+    const bool seen =
+        range_m >= config_.ranges.range_min_m && range_m <= config_.ranges.range_max_m;
+    float& reported_m = among_people_m_[i];
+    if (seen && (reported_m == 0 || range_m < static_cast<double>(reported_m)))
+      reported_m = static_cast<float>(range_m);
+  }
+  return among_people_m_;
 }
 
 void CastAhead::cast(std::uint64_t number) {

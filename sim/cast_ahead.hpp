@@ -43,6 +43,7 @@ class CastAhead {
     bool operator==(const Key& other) const;
   };
   void cast(std::uint64_t number);
+  std::span<const float> with_people(std::uint64_t number, std::span<const float> ranges_m);
 
   const Config config_;
   World& world_;
@@ -54,7 +55,7 @@ class CastAhead {
   std::unique_ptr<ProfileCaster> caster_;
   std::optional<Key> key_;
   std::vector<MirrorTurn> turns_;
-  std::vector<float> ranges_m_;
+  std::vector<float> ranges_m_, among_people_m_;
   std::size_t chunk_ = 4;
   std::uint64_t turns_cast_{};
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "hal/angles.hpp"
@@ -55,6 +56,7 @@ World::World(const Scene& scene, const WorldConfig& config)
       gnss_wander_y_(config.seed, kGnssY, config.gnss_sigma_m * std::sqrt(config.gnss_wander_share),
                      config.gnss_wander_s) {
   robot_.ground_z_m = config.ground_z_m;
+  for (const Person& person : config.people) people_.emplace_back(person);
 }
 
 // What wheels stand on: the highest surface that is a step up or down at most.
@@ -118,12 +120,13 @@ void World::advance(hal::Time now) {
   const std::int64_t until = now.time_since_epoch() / kTick;
   while (ticks_ < until) {
     const bool still = !moving() && left_.target_mps == 0 && right_.target_mps == 0;
-    if (still) {  // Nothing happens until somebody commands something.
+    if (still && people_.empty()) {  // Nothing happens until somebody commands something.
       ticks_ = until;
       yaw_rate_radps_ = 0;
     } else {
       ++ticks_;
       tick();
+      walk();
     }
   }
 }
@@ -135,6 +138,29 @@ void World::tick() {
   const double before_rad = robot_.pose.heading_rad;
   move(left_m, right_m);
   yaw_rate_radps_ = hal::wrapped(robot_.pose.heading_rad - before_rad) / kTick_s;
+}
+
+void World::walk() {
+  for (Walker& walker : people_)
+    walker.walk(kTick_s, robot_.pose.position_m, config_.radius_m, moving());
+}
+
+bool World::runs_into_person(const Eigen::Vector2d& to) const {
+  return std::ranges::any_of(people_, [&](const Walker& walker) {
+    const double touching_m = config_.radius_m + walker.person().radius_m;
+    const double now_m = (walker.position_m() - robot_.pose.position_m).norm();
+    return (walker.position_m() - to).norm() < std::min(touching_m, now_m);
+  });
+}
+
+double World::range_to_people_m(const Eigen::Vector3d& W_from,
+                                const Eigen::Vector3d& W_direction) const {
+  double nearest_m = std::numeric_limits<double>::infinity();
+  for (const Walker& walker : people_)
+    nearest_m = std::min(
+        nearest_m,
+        walker.range_m(W_from - config_.ground_z_m * Eigen::Vector3d::UnitZ(), W_direction));
+  return nearest_m;
 }
 
 double World::roll(Side& side) {
@@ -173,6 +199,7 @@ void World::move(double left_m, double right_m) {
 }
 
 bool World::blocked(const StandingPose& to) {
+  if (runs_into_person(to.pose.position_m)) return true;
   if (clear_m_ <= 0) {
     const double radius_m = config_.radius_m;
     clear_m_ =
@@ -215,7 +242,8 @@ bool World::free_ahead(double forward_mps) const {
   const double clear_m =
       scene_.clearance_m(ahead.pose.position_m, ahead.ground_z_m + config_.step_max_m,
                          ahead.ground_z_m + config_.collision_height_m, config_.radius_m);
-  return clear_m >= config_.radius_m && !ground_breaks_off(ahead);
+  return clear_m >= config_.radius_m && !ground_breaks_off(ahead) &&
+         !runs_into_person(ahead.pose.position_m);
 }
 
 hal::Twist World::rolling() const {

@@ -12,6 +12,7 @@
 
 #include "hal/values.hpp"
 #include "sim/noise.hpp"
+#include "sim/people.hpp"
 #include "sim/scan.hpp"
 #include "sim/scene.hpp"
 
@@ -59,6 +60,8 @@ struct WorldConfig {
 
   double ground_z_m = 0;                            // Expected where no region says otherwise.
   std::map<std::string, double> region_ground_z_m;  // By name, for Placement.
+
+  std::vector<Person> people;  // On ground_z_m.
 };
 
 // A pose on the ground it stands on.
@@ -104,6 +107,11 @@ class World {
   int collisions() const { return collisions_; }
   double driven_m() const { return driven_m_; }  // Of the body's centre.
 
+  // Those who walk about, at the latest tick.
+  const std::vector<Walker>& people() const { return people_; }
+  // How far away along a ray (unit direction) the first of them is; infinite: none.
+  double range_to_people_m(const Eigen::Vector3d& W_from, const Eigen::Vector3d& W_direction) const;
+
   // What the sensors say at the latest tick. Each has one reader: asking again draws new noise.
   hal::WheelTravel take_travel();  // Whole encoder ticks since the last call.
   hal::ImuSample sample_imu();     // Yaw rate over the latest tick.
@@ -136,6 +144,8 @@ class World {
   double roll(Side& side);  // Over one tick: how far the ground went by.
   void move(double left_m, double right_m);
   bool blocked(const StandingPose& to);
+  bool runs_into_person(const Eigen::Vector2d& to) const;
+  void walk();
   bool ground_breaks_off(const StandingPose& at) const;
   void stop_against_something();
   bool free_ahead(double forward_mps) const;
@@ -158,6 +168,7 @@ class World {
   NoiseStream gnss_white_;
   WanderingNoise gnss_wander_x_, gnss_wander_y_;
   std::int64_t gnss_tick_ = 0;
+  std::vector<Walker> people_;
   std::optional<StandingPose> placed_scanner_;
   std::uint64_t scans_begun_ = 0;
   std::vector<ScanTruth> scans_;

@@ -1,0 +1,50 @@
+#include "sim/people.hpp"
+
+#include <cmath>
+#include <limits>
+
+namespace sim {
+
+void Walker::turn_round() {
+  step_ = -step_;
+  next_ += step_;
+  waited_s_ = 0;
+}
+
+void Walker::walk(double span_s, const Eigen::Vector2d& robot_m, double robot_radius_m,
+                  bool robot_moves) {
+  const int last = static_cast<int>(person_.way_m.size()) - 1;
+  walked_s_ += span_s;
+  if (last == 0 || walked_s_ < person_.start_s) return;
+  if (next_ < 0 || next_ > last) turn_round();
+  const Eigen::Vector2d& goal_m = person_.way_m[static_cast<std::size_t>(next_)];
+  const Eigen::Vector2d rest_m = goal_m - at_m_;
+  const double step_m = std::min(person_.speed_mps * span_s, rest_m.norm());
+  const Eigen::Vector2d to_m = step_m > 0 ? at_m_ + step_m * rest_m.normalized() : at_m_;
+  const double keep_m = robot_radius_m + person_.radius_m + (robot_moves ? kStepsAsideM : kPassesM);
+  const double there_m = (to_m - robot_m).norm();
+  if (there_m < keep_m && there_m < (at_m_ - robot_m).norm()) {
+    waited_s_ += span_s;
+    if (waited_s_ > kPatienceS) turn_round();
+    return;
+  }
+  waited_s_ = 0;
+  at_m_ = to_m;
+  if ((goal_m - at_m_).norm() < 1e-9) next_ += step_;
+}
+
+double Walker::range_m(const Eigen::Vector3d& from, const Eigen::Vector3d& direction) const {
+  const double infinite = std::numeric_limits<double>::infinity();
+  const Eigen::Vector2d way = direction.head<2>();
+  const Eigen::Vector2d to_axis = at_m_ - from.head<2>();
+  const double a = way.squaredNorm();
+  const double b = way.dot(to_axis);
+  const double c = to_axis.squaredNorm() - person_.radius_m * person_.radius_m;
+  const double root = b * b - a * c;
+  if (a < 1e-12 || root < 0) return infinite;
+  const double range_m = (b - std::sqrt(root)) / a;
+  const double z_m = from.z() + range_m * direction.z();
+  return range_m > 0 && z_m >= 0 && z_m <= person_.height_m ? range_m : infinite;
+}
+
+}  // namespace sim
