@@ -146,7 +146,7 @@ hal::Task<bool> Hokuyo::begin() {
   fit_ = ClockFit();
   last_ms_.reset();
   const Bytes request =
-      scip_stream_request(config_.intensities, step_first(), step_last(), 0, 0, 0);
+      scip_stream_request(config_.intensities, step_first(), step_last(), 0, config_.skip, 0);
   last_scan_ = clock_.now();
   queue_.clear();
   streaming_ = true;
@@ -247,7 +247,7 @@ void Hokuyo::take_scan(hal::Time arrival) {
 void Hokuyo::add_profile(hal::Time stamp, std::uint64_t lost) {
   hal::Profile profile;
   profile.stamp = stamp;
-  profile.beam_period_s = period_s() * scan_.group / parameters_.steps_per_turn;
+  profile.beam_period_s = turn_s() * scan_.group / parameters_.steps_per_turn;
   profile.angle_first_rad = scip_angle_rad(parameters_, scan_, 0);
   profile.angle_step_rad = 2 * std::numbers::pi * scan_.group / parameters_.steps_per_turn;
   profile.lost_before = lost;

@@ -15,6 +15,7 @@ struct HokuyoConfig {
   std::string model;  // How what it says it is must begin ("UST-20LX"); empty: any.
   bool intensities{};
   std::optional<int> step_first, step_last;  // Of the sector; nothing: all that it has.
+  int skip = 0;                              // Turns left out between two scans, 0 to 9.
   std::size_t profiles_max = 1024;           // That wait; then the oldest are lost and counted.
   double retry_s = 1;                        // From losing the scanner to trying again.
 };
@@ -46,7 +47,8 @@ class Hokuyo final : public ProfileLoop {
   hal::Task<bool> is_alive() override;
   hal::Task<bool> stream(bool on) override;
   void take(ByteView frame, hal::Time arrival) override;
-  double period_s() const override { return 60.0 / parameters_.speed_rpm; }
+  double turn_s() const { return 60.0 / parameters_.speed_rpm; }
+  double period_s() const override { return turn_s() * (config_.skip + 1); }
 
   hal::Task<bool> wake_up();
   hal::Task<bool> identify();

@@ -111,6 +111,8 @@ struct Devices {
   Placement& placement;
   // What is wrong with them now, in words for the operator; empty text: nothing. May be empty.
   std::function<std::string()> troubles = {};
+  // Looks level ahead while the robot drives, to see what is in the way. Null: the robot has none.
+  ProfileScanner* obstacles = nullptr;
 };
 
 }  // namespace hal
