@@ -73,6 +73,17 @@ struct GnssConfig {
   std::string link = "serial:/dev/ttyACM0@38400";
 };
 
+// [obstacles]: a profile scanner that looks level while the robot drives. Without one the robot
+// drives by its map and learns of what that lacks from its scans, or by touching it.
+struct ObstaclesConfig {
+  std::string device = "none";  // or "hokuyo"
+  std::string link = "tcp:192.168.0.10:10940";
+  std::string model;  // How what it says it is begins; empty: any.
+  double height_m = 0.3;
+  double offset_x_m = 0;  // Ahead of the robot's middle.
+  double patience_s = 5;  // What stands in the way for longer is gone round.
+};
+
 // [power]: links of Modbus units; empty where the robot has none.
 struct PowerConfig {
   std::string battery_link;  // A Victron battery service.
@@ -91,15 +102,17 @@ struct SimConfig {
   double placement_sigma_m = 0.01;  // A scanner set up by hand on surveyed marks.
   double placement_heading_sigma_deg = 0.05;
   double placement_s = 900.0;  // Time to carry it there and set it up.
+  int people = 0;              // Who walk about in the robot's area.
 };
 
-// [battery] of the robot file: what `vantage plan` reckons with. Watts are all that the robot draws
-// in that state, scanner and computers included.
+// [battery] of the robot file: what plans and missions reckon with. Watts are all that the robot
+// draws in that state, scanner and computers included.
 struct BatteryConfig {
   double capacity_wh = 720;
   double drive_w = 180;
   double scan_w = 70;
-  double idle_w = 50;  // While a person carries the scanner.
+  double idle_w = 50;          // While a person carries the scanner.
+  double reserve_share = 0.1;  // Kept at every decision, besides what the way home takes.
 };
 
 struct RobotConfig {
@@ -109,6 +122,7 @@ struct RobotConfig {
   DriveConfig drive;
   ScannerConfig scanner;
   PanConfig pan;
+  ObstaclesConfig obstacles;
   ImuConfig imu;
   GnssConfig gnss;
   PowerConfig power;

@@ -242,6 +242,25 @@ SectionSpec pan_section() {
           {}};
 }
 
+SectionSpec obstacles_section() {
+  using O = ObstaclesConfig;
+  const Keys<O> keys{[](MissionConfig& c) -> O& { return c.robot.obstacles; }};
+  return {ConfigFile::robot,
+          "obstacles",
+          "What looks level ahead while the robot drives: it slows down and stops for what is in "
+          "the way, waits, and goes round.",
+          {keys.other("device", &O::device, "A Hokuyo, or none", {"none", "hokuyo"}),
+           keys.other("link", &O::link, "Where it is: tcp:HOST:10940, serial:/dev/ttyACM2@115200"),
+           keys.other("model", &O::model, "How what it says it is begins, such as `UST-20LX`"),
+           keys.number("height_m", &O::height_m, 0.02, 3, "m",
+                       "Above the ground: it sees nothing lower"),
+           keys.number("offset_x_m", &O::offset_x_m, -2, 2, "m", "Ahead of the robot's middle"),
+           keys.number("patience_s", &O::patience_s, 0, 600, "s",
+                       "What is in the way for longer is gone round")},
+          {},
+          {}};
+}
+
 SectionSpec imu_section() {
   using I = ImuConfig;
   const Keys<I> keys{[](MissionConfig& c) -> I& { return c.robot.imu; }};
@@ -333,13 +352,16 @@ SectionSpec battery_section() {
   const Keys<B> keys{[](MissionConfig& c) -> B& { return c.robot.battery; }};
   return {ConfigFile::robot,
           "battery",
-          "What `vantage plan` reckons with. Watts are all that the robot draws in that state, "
+          "What plans and missions reckon with. Watts are all that the robot draws in that state, "
           "computers and scanner included.",
           {keys.number("capacity_wh", &B::capacity_wh, 1, 1e6, "Wh", "That may be used up"),
            keys.number("drive_w", &B::drive_w, 0, 1e5, "W", "While driving"),
            keys.number("scan_w", &B::scan_w, 0, 1e5, "W", "Standing, while the robot scans"),
            keys.number("idle_w", &B::idle_w, 0, 1e5, "W",
-                       "Standing, while a person carries the scanner and scans")},
+                       "Standing, while a person carries the scanner and scans"),
+           keys.number("reserve_share", &B::reserve_share, 0, 0.9, "share",
+                       "Of the capacity that a mission keeps at every decision, besides what the "
+                       "way home takes")},
           {},
           {}};
 }
@@ -366,7 +388,9 @@ SectionSpec sim_section() {
            keys.number("placement_heading_sigma_deg", &S::placement_heading_sigma_deg, 0, 45, "deg",
                        "The same for its heading"),
            keys.number("placement_s", &S::placement_s, 0, 86'400, "s",
-                       "Time to carry the scanner to a station and set it up")},
+                       "Time to carry the scanner to a station and set it up"),
+           keys.number("people", &S::people, 0, 100, "",
+                       "Who walk about in the area where the robot starts")},
           {},
           {}};
 }
@@ -447,10 +471,11 @@ std::string_view name(ConfigFile file) {
 
 const std::vector<SectionSpec>& config_schema() {
   static const std::vector<SectionSpec> schema{
-      mission_section(), phase1_section(), phase2_section(), localize_section(), register_section(),
-      regions_section(), robot_section(),  body_section(),   drive_section(),    scanner_section(),
-      pan_section(),     imu_section(),    gnss_section(),   power_section(),    battery_section(),
-      sim_section(),     plan_section(),   station_section()};
+      mission_section(),  phase1_section(),  phase2_section(), localize_section(),
+      register_section(), regions_section(), robot_section(),  body_section(),
+      drive_section(),    scanner_section(), pan_section(),    obstacles_section(),
+      imu_section(),      gnss_section(),    power_section(),  battery_section(),
+      sim_section(),      plan_section(),    station_section()};
   return schema;
 }
 

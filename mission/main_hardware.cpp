@@ -99,8 +99,13 @@ GuardedSurvey::GuardedSurvey(const Prepared& prepared, int threads, Config confi
       imu_(parts.drivers.imu(), watch_, parts.clock),
       gnss_(parts.drivers.gnss(), watch_, parts.clock),
       scanner_(parts.drivers, watch_, parts.clock),
-      devices_{drive_,   imu_,       gnss_,
-               scanner_, placement_, [&drivers = parts.drivers] { return drivers.complaints(); }},
+      devices_{drive_,
+               imu_,
+               gnss_,
+               scanner_,
+               placement_,
+               [&drivers = parts.drivers] { return drivers.complaints(); },
+               parts.drivers.obstacles()},
       survey_(prepared.config, prepared.site.map, prepared.tasks, threads,
               {parts.clock, devices_, parts.store, parts.progress, parts.compute}) {}
 

@@ -25,12 +25,18 @@ struct Role {
 
 const std::string kNone;
 
+bool has_obstacles(const RobotConfig& robot) {
+  return robot.obstacles.device != "none";
+}
+
 std::vector<Role> roles_of(const RobotConfig& robot) {
   return {{"drive.link", robot.drive.link, Kind::can, false},
           {"scanner.link", robot.scanner.link,
            needs_pan(robot.scanner) ? Kind::stream : Kind::datagrams, false},
           {"pan.link", needs_pan(robot.scanner) ? robot.pan.link : kNone, Kind::stream,
            !needs_pan(robot.scanner)},
+          {"obstacles.link", has_obstacles(robot) ? robot.obstacles.link : kNone, Kind::stream,
+           !has_obstacles(robot)},
           {"imu.link", robot.imu.link, Kind::stream, false},
           {"gnss.link", robot.gnss.link, Kind::stream, false},
           {"power.battery_link", robot.power.battery_link, Kind::registers, true},
@@ -102,6 +108,7 @@ HardwareLinks::HardwareLinks(const RobotConfig& config,
   } else {
     ends_.packets = open_datagrams("scanner", config.scanner.link);
   }
+  if (has_obstacles(config)) ends_.obstacles = open_stream("obstacles", config.obstacles.link);
   ends_.imu = open_stream("imu", config.imu.link);
   ends_.gnss = open_stream("gnss", config.gnss.link);
   ends_.power.battery = open_registers("power", config.power.battery_link);

@@ -23,6 +23,7 @@
 namespace mission {
 namespace {
 
+constexpr int kObstacleTurnsSkipped = 3;  // Of 40 a second.
 constexpr hal::Duration kLook = std::chrono::milliseconds(100);
 
 constexpr double radians(double degrees) {
@@ -69,6 +70,7 @@ RobotDrivers::RobotDrivers(const RobotConfig& config,
   imu_ = &own("imu", config.imu.link,
               std::make_unique<drivers::Vn100>(drivers::Vn100Config{}, clock_, *links.imu));
   add_gnss(config, anchor, links);
+  add_obstacles(config, links);
   add_power(config, links);
 }
 
@@ -164,6 +166,17 @@ void RobotDrivers::add_gnss(const RobotConfig& config,
     gnss_ = &own("gnss", config.gnss.link,
                  std::make_unique<drivers::Ublox>(
                      drivers::UbloxConfig{.settings = {}, .output = output}, clock_, *links.gnss));
+}
+
+// Ten scans a second are enough for what moves at a walk, and the newest are what counts.
+void RobotDrivers::add_obstacles(const RobotConfig& config, const Links& links) {
+  if (config.obstacles.device == "none" || !links.obstacles) return;
+  drivers::HokuyoConfig hokuyo;
+  hokuyo.model = config.obstacles.model;
+  hokuyo.skip = kObstacleTurnsSkipped;
+  hokuyo.profiles_max = 4;
+  obstacles_ = &own("obstacles", config.obstacles.link,
+                    std::make_unique<drivers::Hokuyo>(hokuyo, clock_, *links.obstacles));
 }
 
 void RobotDrivers::add_power(const RobotConfig& config, const Links& links) {

@@ -34,6 +34,7 @@ class RobotDrivers {
   struct Links {
     hal::CanBus* drive{};
     hal::ByteStream *scanner{}, *pan{}, *imu{}, *gnss{};
+    hal::ByteStream* obstacles{};   // Null where the robot has none.
     hal::Datagrams* packets{};      // Of a scanner that sends them: then no other scanner and pan.
     drivers::PowerIo::Links power;  // Null where the robot has none.
   };
@@ -48,6 +49,7 @@ class RobotDrivers {
   hal::Imu& imu() { return *imu_; }
   hal::Gnss& gnss() { return *gnss_; }
   hal::Scanner& scanner() { return *scanner_; }
+  hal::ProfileScanner* obstacles() { return obstacles_; }  // Null: none.
 
   // See drivers::PowerIo::inputs_now(); nothing where the robot has none.
   std::optional<hal::SafetyInputs> safety_inputs() const;
@@ -76,6 +78,7 @@ class RobotDrivers {
   void add_turning(const RobotConfig& config, std::unique_ptr<T> scanner);
   void add_gnss(const RobotConfig& config, const std::optional<drivers::GeoAnchor>& anchor,
                 const Links& links);
+  void add_obstacles(const RobotConfig& config, const Links& links);
   void add_power(const RobotConfig& config, const Links& links);
   template <class T>
   T& own(std::string role, std::string link, std::unique_ptr<T> device);
@@ -91,6 +94,7 @@ class RobotDrivers {
   hal::Gnss* gnss_{};
   std::unique_ptr<drivers::SweepScanner> sweep_;
   hal::Scanner* scanner_{};
+  hal::ProfileScanner* obstacles_{};
   std::function<const std::string&()> scan_problem_;
 };
 

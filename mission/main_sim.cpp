@@ -12,6 +12,7 @@
 #include "mission/files.hpp"
 #include "nav/polygons.hpp"
 #include "nav/raster.hpp"
+#include "nav/roadmap.hpp"
 #include "sim/ground.hpp"
 #include "sim/reachable.hpp"
 #include "sim/surface_truth.hpp"
@@ -27,6 +28,9 @@ constexpr double radians(double degrees) {
 constexpr double kGroundSampleM = 4.0;
 // Ways are looked for in steps of this: a gap that leaves the robot this much play is a way.
 constexpr double kReachCellM = 0.25;
+// People walk so fast, and do not begin where the robot stands.
+constexpr double kWalkMps = 1.2, kWalkersAwayM = 3;
+constexpr std::uint64_t kWalkersDraw = 4711, kWalkersDrawsMax = 10'000;
 
 constexpr std::size_t kEventsMax = 200;
 
@@ -42,6 +46,37 @@ sim::ScannerModel scanner_model(const RobotConfig& robot) {
           .elevation_step_rad = radians(scanner.elevation_step_deg),
           .scan_s = scanner.scan_s,
           .range_sigma_m = robot.sim.range_sigma_m};
+}
+
+double start_ground_z_m(const SiteTasks& tasks) {
+  if (tasks.start_area < 0) return 0;
+  return tasks.tasks[static_cast<std::size_t>(tasks.start_area)].area.ground_z_m;
+}
+
+// Each to and fro between two places, along the roads: they know the site.
+std::vector<sim::Person> walkers(const MissionConfig& config, const SiteTasks& tasks) {
+  std::vector<sim::Person> people;
+  if (tasks.start_area < 0 || config.robot.sim.people == 0) return people;
+  const nav::FreeArea& area = tasks.tasks[static_cast<std::size_t>(tasks.start_area)].area;
+  Eigen::AlignedBox2d box;
+  for (const nav::SegmentMm& edge : nav::edges(area.standable)) box.extend(nav::to_m(edge.a));
+  const nav::Roadmap roads = nav::Roadmap::build(area, config.robot.body.radius_m);
+  const auto place = [&](std::uint64_t number) -> Eigen::Vector2d {
+    const auto share = [&](std::uint64_t axis) {
+      const std::uint64_t drawn =
+          sim::mix(sim::mix(config.seed + kWalkersDraw) ^ (2 * number + axis));
+      return static_cast<double>(drawn >> 11) * 0x1.0p-53;
+    };
+    return box.min() + box.sizes().cwiseProduct(Eigen::Vector2d(share(0), share(1)));
+  };
+  for (std::uint64_t draw = 0;
+       draw < kWalkersDrawsMax && std::ssize(people) < config.robot.sim.people; ++draw) {
+    const Eigen::Vector2d from_m = place(2 * draw), to_m = place(2 * draw + 1);
+    if ((from_m - tasks.start.position_m).norm() < kWalkersAwayM) continue;
+    if (const auto route = roads.route(from_m, to_m))
+      people.push_back({.way_m = route->points_m, .speed_mps = kWalkMps});
+  }
+  return people;
 }
 
 sim::WorldConfig world_config(const MissionConfig& config, const SiteTasks& tasks, int threads) {
@@ -68,14 +103,11 @@ sim::WorldConfig world_config(const MissionConfig& config, const SiteTasks& task
   world.placement_heading_sigma_rad = radians(robot.sim.placement_heading_sigma_deg);
   world.placement_s = robot.sim.placement_s;
   world.scanner = scanner_model(robot);
+  world.ground_z_m = start_ground_z_m(tasks);
+  world.people = walkers(config, tasks);
   for (const AreaTask& task : tasks.tasks)
     world.region_ground_z_m[task.area.name] = task.area.ground_z_m;
   return world;
-}
-
-double start_ground_z_m(const SiteTasks& tasks) {
-  if (tasks.start_area < 0) return 0;
-  return tasks.tasks[static_cast<std::size_t>(tasks.start_area)].area.ground_z_m;
 }
 
 // Centres of a grid of cells on the standable ground.
@@ -165,8 +197,13 @@ SimBackend::SimBackend(const MissionConfig& config, const SiteTasks& tasks, SimS
             robot_.drivers().drive()),
       scanner_(robot_.drivers().scanner(), true_site_.world(), clock_),
       placement_(true_site_.world(), clock_),
-      devices_{gate_,      robot_.drivers().imu(),         robot_.drivers().gnss(), scanner_,
-               placement_, [this] { return complaints(); }} {}
+      devices_{gate_,
+               robot_.drivers().imu(),
+               robot_.drivers().gnss(),
+               scanner_,
+               placement_,
+               [this] { return complaints(); },
+               robot_.drivers().obstacles()} {}
 
 std::string SimBackend::complaints() {
   const std::string gate = gate_.why(), all = robot_.drivers().complaints();

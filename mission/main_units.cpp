@@ -9,6 +9,7 @@ namespace mission {
 namespace {
 
 constexpr double kArcsecPerStep = 46.2857;  // A PTU-E46-70 in half steps.
+constexpr double kObstacleRangeMax_m = 20;  // Of a UST-20LX.
 constexpr double kShortRangeMax_m = 65;     // What an LMS5xx can tell in millimetres.
 
 constexpr double radians(double degrees) {
@@ -39,6 +40,7 @@ RobotUnits::RobotUnits(const RobotConfig& config, const drivers::GeoAnchor& anch
   if (links.imu)
     imu_.emplace(sim::Vn100UnitConfig{}, world_, clock_, *links.imu, add_faults("imu"));
   if (links.gnss) add_gnss(config, anchor, links);
+  if (links.obstacles && config.obstacles.device != "none") add_obstacles(config, threads, links);
   add_power(config.power);
 }
 
@@ -100,6 +102,20 @@ void RobotUnits::add_sweep(const RobotConfig& config, int threads, const UnitLin
   lms_.emplace(lms, world_, clock_, *links.scanner, add_faults("scanner"), *ptu_);
 }
 
+void RobotUnits::add_obstacles(const RobotConfig& config, int threads, const UnitLinks& links) {
+  sim::HokuyoUnitConfig hokuyo;
+  hokuyo.parameters = hokuyo_parameters(config.obstacles.model);
+  // Lower than the scanner whose height the world knows, by so much.
+  hokuyo.T_P_L.translation() << config.obstacles.offset_x_m, 0,
+      config.obstacles.height_m - world_.config().scanner.height_m;
+  hokuyo.ranges = world_.config().scanner;
+  hokuyo.ranges.range_min_m = hokuyo.parameters.range_min_mm / 1000.0;
+  hokuyo.ranges.range_max_m = kObstacleRangeMax_m;
+  hokuyo.seed = seed_ + 1;
+  hokuyo.threads = threads;
+  obstacles_.emplace(hokuyo, world_, clock_, *links.obstacles, add_faults("obstacles"), level_);
+}
+
 void RobotUnits::add_turning(const ScannerConfig& config, sim::DatagramSender& packets) {
   if (config.device == "ouster") {
     sim::OusterUnitConfig ouster;
@@ -154,6 +170,7 @@ hal::Task<void> RobotUnits::run() {
   add(ptu_);
   add(lms_);
   add(hokuyo_);
+  add(obstacles_);
   add(velodyne_);
   add(ouster_);
   add(imu_);
@@ -167,7 +184,13 @@ hal::Task<void> RobotUnits::run() {
 SimulatedRobot::SimulatedRobot(const RobotConfig& config, const drivers::GeoAnchor& anchor,
                                std::uint64_t seed, int threads, sim::World& world,
                                hal::Clock& clock)
-    : can_(clock), scanner_(clock), pan_(clock), imu_(clock), gnss_(clock), packets_(clock) {
+    : can_(clock),
+      scanner_(clock),
+      pan_(clock),
+      imu_(clock),
+      gnss_(clock),
+      obstacles_(clock),
+      packets_(clock) {
   hal::CanBus& drivers_end = can_.attach();
   const UnitLinks ends{.drive = &can_.attach(),
                        .second_drive = config.drive.device == "cia402" ? &can_.attach() : nullptr,
@@ -175,6 +198,7 @@ SimulatedRobot::SimulatedRobot(const RobotConfig& config, const drivers::GeoAnch
                        .pan = &pan_.b(),
                        .imu = &imu_.b(),
                        .gnss = &gnss_.b(),
+                       .obstacles = &obstacles_.b(),
                        .packets = &packets_.sender()};
   units_ = std::make_unique<RobotUnits>(config, anchor, seed, threads, world, clock, ends);
   const auto registers = [&](sim::RegisterUnit* unit) -> hal::Registers* {
@@ -188,6 +212,7 @@ SimulatedRobot::SimulatedRobot(const RobotConfig& config, const drivers::GeoAnch
                           .pan = &pan_.a(),
                           .imu = &imu_.a(),
                           .gnss = &gnss_.a(),
+                          .obstacles = &obstacles_.a(),
                           .packets = &packets_.receiver(),
                           .power = {.battery = registers(units_->battery()),
                                     .gateway = nullptr,

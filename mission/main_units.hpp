@@ -38,12 +38,12 @@ inline constexpr drivers::GeoAnchor kSimAnchor{48.0, 11.0, 500, 0};
 struct UnitLinks {
   // An AgileX base uses the first end of the bus, two CiA 402 drives one each.
   hal::CanBus *drive{}, *second_drive{};
-  hal::ByteStream *scanner{}, *pan{}, *imu{}, *gnss{};
+  hal::ByteStream *scanner{}, *pan{}, *imu{}, *gnss{}, *obstacles{};
   sim::DatagramSender* packets{};  // Of a scanner that turns by itself.
 };
 
 // Which faults the units have, by role: "drive", "drive2" (the right one of two), "scanner", "pan",
-// "imu", "gnss", "battery", "board", "safety".
+// "obstacles", "imu", "gnss", "battery", "board", "safety".
 class RobotUnits {
  public:
   RobotUnits(const RobotConfig& config, const drivers::GeoAnchor& anchor, std::uint64_t seed,
@@ -70,6 +70,7 @@ class RobotUnits {
   sim::UnitFaults& add_faults(std::string role);
   void add_drive(const RobotConfig& config, const UnitLinks& links);
   void add_sweep(const RobotConfig& config, int threads, const UnitLinks& links);
+  void add_obstacles(const RobotConfig& config, int threads, const UnitLinks& links);
   void add_turning(const ScannerConfig& config, sim::DatagramSender& packets);
   void add_gnss(const RobotConfig& config, const drivers::GeoAnchor& anchor,
                 const UnitLinks& links);
@@ -82,9 +83,10 @@ class RobotUnits {
   sim::Battery supply_;
   std::optional<sim::AgilexUnit> agilex_;
   std::optional<sim::Cia402Unit> cia402_;
+  const sim::FixedPan level_;
   std::optional<sim::FlirPtuUnit> ptu_;
   std::optional<sim::SickLmsUnit> lms_;
-  std::optional<sim::HokuyoUnit> hokuyo_;
+  std::optional<sim::HokuyoUnit> hokuyo_, obstacles_;
   std::optional<sim::VelodyneUnit> velodyne_;
   std::optional<sim::OusterUnit> ouster_;
   std::optional<sim::Vn100Unit> imu_;
@@ -110,7 +112,7 @@ class SimulatedRobot {
 
  private:
   sim::CanWire can_;
-  sim::StreamWire scanner_, pan_, imu_, gnss_;
+  sim::StreamWire scanner_, pan_, imu_, gnss_, obstacles_;
   sim::DatagramWire packets_;
   std::unique_ptr<RobotUnits> units_;
   std::vector<std::unique_ptr<sim::RegisterWire>> registers_;

@@ -5,6 +5,8 @@
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <numbers>
 
+#include "nav/polygons.hpp"
+
 namespace mission {
 namespace {
 
@@ -16,6 +18,16 @@ constexpr double kBackOffM = 0.5;
 // How long a drive may not obey: a cable or a restart takes less, a person at an e-stop more.
 constexpr hal::Duration kLostPatience = std::chrono::minutes(2);
 constexpr hal::Duration kHeldPatience = std::chrono::minutes(10);
+constexpr hal::Duration kBlindPatience = std::chrono::seconds(30);
+constexpr hal::Duration kBlindAfter = std::chrono::milliseconds(350);  // Without a profile.
+// What was closed for now is taken to be open again after so long: it is seen anew if it is there.
+constexpr hal::Duration kClosedForNow = std::chrono::minutes(2);
+constexpr double kKeepM = 0.04;        // From what it drives past: what profiles are sure of.
+constexpr double kSeenSideM = 0.2;     // Square that is closed around a point that was seen,
+constexpr double kWallSideM = 0.12;    // the same before a wall of the map,
+constexpr double kSeenAroundM = 3.0;   // so far around what is in the way,
+constexpr double kKnownWallM = 0.15;   // but not along the walls of the map.
+constexpr double kNearEnoughM = 0.25;  // Of a goal that cannot be reached.
 constexpr hal::Duration kAskAgain = std::chrono::milliseconds(200);
 
 namespace errc = boost::system::errc;
@@ -62,6 +74,15 @@ Eigen::Matrix3d start_covariance() {
 
 }  // namespace
 
+nav::ZoneConfig zone_config(const BodyConfig& body) {
+  nav::ZoneConfig config;
+  config.robot_radius_m = body.radius_m;
+  config.keep_m = kKeepM;
+  config.horizon_m = 1.5 + body.speed_max_mps *
+                               (config.reaction_s + body.speed_max_mps / 2 / config.brake_max_mps2);
+  return config;
+}
+
 nav::FollowConfig follow_config(const BodyConfig& body) {
   nav::FollowConfig config;
   config.speed_max_mps = body.speed_max_mps;
@@ -98,7 +119,7 @@ Pilot::Pilot(const RobotConfig& config, hal::Clock& clock, hal::Devices& devices
 
 hal::Task<void> Pilot::track() {
   using boost::asio::experimental::awaitable_operators::operator&&;
-  co_await (track_travel() && track_imu() && track_gnss());
+  co_await (track_travel() && track_imu() && track_gnss() && track_obstacles());
 }
 
 hal::Task<void> Pilot::track_travel() {
@@ -146,31 +167,125 @@ nav::Correction Pilot::correct_by_map(const hal::Pose2& pose, const Eigen::Matri
   return correct(pose, covariance);
 }
 
+hal::Task<void> Pilot::track_obstacles() {
+  while (devices_.obstacles) {
+    const auto profile = co_await devices_.obstacles->next_profile();
+    if (!profile) {
+      co_await clock_.sleep_for(kAskAgain);
+      continue;
+    }
+    hal::Pose2 looks_from = pose();
+    looks_from.position_m +=
+        config_.obstacles.offset_x_m *
+        Eigen::Vector2d(std::cos(looks_from.heading_rad), std::sin(looks_from.heading_rad));
+    looked_at_ = clock_.now();
+    obstacles_.add(*profile, looks_from, clock_.now());
+  }
+}
+
 hal::Task<LegEnd> Pilot::drive_to(Roads& roads, hal::Pose2 goal) {
-  LegEnd leg;
+  if (closed_for_now_at_ && clock_.now() - *closed_for_now_at_ > kClosedForNow) {
+    roads.reopen();
+    closed_for_now_at_.reset();
+  }
+  looked_at_.reset();
+  // One that does not start leaves the robot blind: the way ends with that reason.
+  if (devices_.obstacles) (void)co_await devices_.obstacles->start();
   const double before_m = travelled_m_;
-  for (int tries = 0; tries < kTriesMax && !leg.arrived; ++tries) {
+  LegEnd leg = co_await drive_on(roads, goal);
+  if (devices_.obstacles) (void)co_await devices_.obstacles->stop();
+  obstacles_.clear();  // By the next leg the world has moved on.
+  leg.driven_m = travelled_m_ - before_m;
+  leg.short_of_goal_m = (goal.position_m - pose().position_m).norm();
+  if (leg.arrived) leg.reason.clear();
+  co_return leg;
+}
+
+hal::Task<LegEnd> Pilot::drive_on(Roads& roads, hal::Pose2 goal) {
+  LegEnd leg;
+  int touched = 0;
+  bool reopened = false;
+  std::string met;
+  for (int tries = 0; tries < kRoutesMax && touched < kTouchesMax && !leg.arrived; ++tries) {
     nav::NoRoute why{};
     const auto route = roads.roadmap().route(pose().position_m, goal.position_m, &why);
+    if (!route && !reopened && roads.reopen()) {
+      reopened = true;
+      continue;
+    }
     if (!route) {
-      leg.reason = nav::name(why);
+      leg.reason = std::string(nav::name(why)) + met;
       break;
     }
     const RouteEnd end = co_await follow_route(*route, goal, leg);
-    leg.arrived = end == RouteEnd::arrived;
+    leg.arrived = end == RouteEnd::arrived || end == RouteEnd::near;
     leg.drive_lost = end == RouteEnd::drive_lost;
-    if (leg.drive_lost) break;
-    if (end != RouteEnd::blocked) continue;  // There, or from here by another route.
-    leg.reason = fmt::format("the way was blocked {} times", tries + 1);
-    const hal::Pose2 here = pose();
-    const Eigen::Vector2d ahead{std::cos(here.heading_rad), std::sin(here.heading_rad)};
-    co_await back_off();
-    roads.close({here.position_m + (config_.body.radius_m + kObstacleAheadM) * ahead},
-                kTouchedSideM);
+    if (leg.drive_lost || end == RouteEnd::blind) break;
+    if (end != RouteEnd::touched && end != RouteEnd::in_the_way) continue;  // There, or once more.
+    touched += end == RouteEnd::touched;
+    ++leg.obstacles_met;
+    leg.reason = fmt::format("the way was blocked {} times", leg.obstacles_met);
+    const Eigen::Vector2d at_m = end == RouteEnd::touched ? pose().position_m : W_in_way_m_;
+    met = fmt::format("; something was in the way at ({:.1f}, {:.1f}) m", at_m.x(), at_m.y());
+    if (end == RouteEnd::touched)
+      co_await close_touched(roads);
+    else
+      close_seen(roads, W_in_way_m_);
+    if (end == RouteEnd::in_the_way) closed_for_now_at_ = clock_.now();
   }
-  leg.driven_m = travelled_m_ - before_m;
-  if (leg.arrived) leg.reason.clear();
   co_return leg;
+}
+
+hal::Task<void> Pilot::close_touched(Roads& roads) {
+  const hal::Pose2 here = pose();
+  const Eigen::Vector2d ahead{std::cos(here.heading_rad), std::sin(here.heading_rad)};
+  co_await back_off();
+  roads.close({here.position_m + (config_.body.radius_m + kObstacleAheadM) * ahead}, kTouchedSideM);
+}
+
+// All that is seen around it, so that the new way does not lead along its other end at once. Walls
+// of the map count only where one of them is in the way: there the roads run too close to it.
+void Pilot::close_seen(Roads& roads, const Eigen::Vector2d& W_in_way_m) const {
+  const nav::Polygons& mapped = roads.mapped();
+  const auto is_wall = [&](const Eigen::Vector2d& point_m) {
+    const nav::PointMm point = nav::to_mm(point_m);
+    return !nav::contains(mapped, point) || nav::border_distance_m(mapped, point) <= kKnownWallM;
+  };
+  const bool before_wall = is_wall(W_in_way_m);
+  std::vector<Eigen::Vector2d> seen_m;
+  for (const Eigen::Vector2d& point_m : obstacles_.points_m())
+    if ((point_m - W_in_way_m).norm() <= kSeenAroundM && (before_wall || !is_wall(point_m)))
+      seen_m.push_back(point_m);
+  seen_m.push_back(W_in_way_m);
+  roads.close_for_now(seen_m, before_wall ? kWallSideM : kSeenSideM);
+}
+
+bool Pilot::is_blind() const {
+  return devices_.obstacles && (!looked_at_ || clock_.now() - *looked_at_ > kBlindAfter);
+}
+
+// `state` is a copy: where the follower would go if nothing were in the way.
+nav::Zones Pilot::zones(const nav::FollowConfig& config, nav::FollowState state,
+                        const nav::Path& path) const {
+  if (!devices_.obstacles) return {};
+  if (is_blind()) return {.cap_mps = 0, .stop = true, .W_in_way_m = std::nullopt};
+  const hal::Twist wanted = nav::follow(config, state, path, pose());
+  return nav::look_ahead(zone_config(config_.body), obstacles_.points_m(), path, state.progress_m,
+                         pose(), wanted);
+}
+
+// False: what is in the way has been there for too long.
+bool Pilot::has_patience(const nav::Zones& zones, Hold& hold, LegEnd& leg) const {
+  if (!zones.stop) {
+    hold.since.reset();
+    return true;
+  }
+  if (!hold.since) hold.since = clock_.now();
+  hold.W_in_way_m = zones.W_in_way_m.value_or(pose().position_m);
+  if (!is_blind()) leg.waited_s += hal::seconds(kControlPeriod);
+  const hal::Duration patience =
+      is_blind() ? kBlindPatience : hal::from_seconds(config_.obstacles.patience_s);
+  return clock_.now() - *hold.since <= patience;
 }
 
 hal::Task<Pilot::RouteEnd> Pilot::follow_route(const nav::Route& route, hal::Pose2 goal,
@@ -178,12 +293,18 @@ hal::Task<Pilot::RouteEnd> Pilot::follow_route(const nav::Route& route, hal::Pos
   const nav::FollowConfig config = follow_config(config_.body);
   const nav::Path path = nav::path_along(route, goal.heading_rad);
   nav::FollowState state;
+  Hold hold;
   hal::Time late = clock_.now() + time_allowed(config_.body, route);
   RouteEnd end = RouteEnd::given_up;
   leg.reason = "the robot did not get there in the time allowed";
   while (clock_.now() < late) {
     note_track(leg);
-    const hal::Twist twist = nav::follow(config, state, path, pose());
+    const nav::Zones seen = zones(config, state, path);
+    if (!has_patience(seen, hold, leg)) {
+      end = end_of(hold, goal, leg);
+      break;
+    }
+    const hal::Twist twist = nav::follow(config, state, path, pose(), seen.cap_mps);
     if (nav::done(state)) {
       if (state.phase == nav::FollowPhase::arrived) end = RouteEnd::arrived;
       leg.reason = nav::name(state.phase);
@@ -192,7 +313,7 @@ hal::Task<Pilot::RouteEnd> Pilot::follow_route(const nav::Route& route, hal::Pos
     const hal::Time told_at = clock_.now();
     const auto failed = co_await tell_drive(twist, leg);
     if (failed) {
-      end = failed == errc::io_error ? RouteEnd::blocked : RouteEnd::drive_lost;
+      end = failed == errc::io_error ? RouteEnd::touched : RouteEnd::drive_lost;
       break;
     }
     late += clock_.now() - told_at;  // What it waited for the drive.
@@ -200,6 +321,17 @@ hal::Task<Pilot::RouteEnd> Pilot::follow_route(const nav::Route& route, hal::Pos
   }
   co_await halt();
   co_return end;
+}
+
+// A way that ends before something: as good as there, or to be gone round.
+Pilot::RouteEnd Pilot::end_of(const Hold& hold, const hal::Pose2& goal, LegEnd& leg) {
+  if (is_blind()) {
+    leg.reason = "the scanner that looks for obstacles says nothing";
+    return RouteEnd::blind;
+  }
+  W_in_way_m_ = hold.W_in_way_m;
+  return (goal.position_m - pose().position_m).norm() <= kNearEnoughM ? RouteEnd::near
+                                                                      : RouteEnd::in_the_way;
 }
 
 // errc::io_error: the way is blocked. Any other error: the drive did not come back in time, and the

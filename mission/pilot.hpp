@@ -14,6 +14,7 @@
 #include "mission/sensor_log.hpp"
 #include "nav/follow.hpp"
 #include "nav/localizer.hpp"
+#include "nav/obstacle_map.hpp"
 
 namespace mission {
 
@@ -23,11 +24,17 @@ struct LegEnd {
   bool drive_lost{};  // It did not come back in time: nothing more can be driven.
   std::string reason;
   double driven_m{};
+  double short_of_goal_m{};              // Where it ended, as believed.
+  int obstacles_met{};                   // Ways that had something in them.
+  double waited_s{};                     // Standing before it.
   std::vector<Eigen::Vector2d> track_m;  // Believed positions, about one per metre.
 };
 
 // How a robot of this body follows paths.
 nav::FollowConfig follow_config(const BodyConfig& body);
+
+// How a robot of this body slows down and stops for what is in its way.
+nav::ZoneConfig zone_config(const BodyConfig& body);
 
 // How long it takes along the route, from pose to pose and until it stands: the follower at work on
 // a robot that does exactly as told.
@@ -43,9 +50,12 @@ class Pilot {
   // boost::system::system_error).
   hal::Task<void> track();
 
-  // Drives to the goal, at most kTriesMax routes: when the way turns out to be blocked, closes
-  // that spot on the roads and looks for another way. While the drive does not obey (lost, or held
-  // by an e-stop) it waits, for a bounded time, and then goes on where it stands.
+  // Drives to the goal, at most kRoutesMax routes. What it sees in its way it stops for, waits a
+  // little, and then closes the roads there for now; what it touched (at most kTouchesMax times)
+  // closes them for good. Then it looks for another way. Where none is left, what was closed for
+  // now is tried once more: it may have gone. Without a look at what is ahead it stands. While the
+  // drive does not obey (lost, or held by an e-stop) it waits, for a bounded time, and then goes on
+  // where it stands.
   hal::Task<LegEnd> drive_to(Roads& roads, hal::Pose2 goal);
 
   hal::Pose2 pose() const { return localizer_.pose(); }
@@ -61,12 +71,26 @@ class Pilot {
   SensorLog& sensors() { return sensors_; }
 
  private:
-  static constexpr int kTriesMax = 3;
-  enum class RouteEnd { arrived, blocked, given_up, drive_lost };
+  static constexpr int kRoutesMax = 8, kTouchesMax = 3;
+  enum class RouteEnd { arrived, near, touched, in_the_way, blind, given_up, drive_lost };
+  // For how long, and since when, the robot has been standing for what is in its way.
+  struct Hold {
+    std::optional<hal::Time> since;
+    Eigen::Vector2d W_in_way_m{0, 0};
+  };
 
   hal::Task<void> track_travel();
   hal::Task<void> track_imu();
   hal::Task<void> track_gnss();
+  hal::Task<void> track_obstacles();
+  hal::Task<LegEnd> drive_on(Roads& roads, hal::Pose2 goal);
+  bool is_blind() const;
+  nav::Zones zones(const nav::FollowConfig& config, nav::FollowState state,
+                   const nav::Path& path) const;
+  bool has_patience(const nav::Zones& zones, Hold& hold, LegEnd& leg) const;
+  RouteEnd end_of(const Hold& hold, const hal::Pose2& goal, LegEnd& leg);
+  void close_seen(Roads& roads, const Eigen::Vector2d& W_in_way_m) const;
+  hal::Task<void> close_touched(Roads& roads);
   hal::Task<RouteEnd> follow_route(const nav::Route& route, hal::Pose2 goal, LegEnd& leg);
   hal::Task<boost::system::error_code> tell_drive(hal::Twist twist, LegEnd& leg);
   hal::Task<boost::system::error_code> wait_for_drive(boost::system::error_code why, LegEnd& leg);
@@ -80,6 +104,10 @@ class Pilot {
   nav::Localizer localizer_;
   nav::Localizer alone_;
   SensorLog sensors_;
+  nav::ObstacleMap obstacles_;
+  std::optional<hal::Time> looked_at_;  // When the last profile came.
+  Eigen::Vector2d W_in_way_m_{0, 0};    // What ended the last route.
+  std::optional<hal::Time> closed_for_now_at_;
   double travelled_m_{};  // By the wheels, since the start.
 };
 

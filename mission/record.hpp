@@ -11,6 +11,7 @@
 
 #include "hal/values.hpp"
 #include "mission/config.hpp"
+#include "mission/energy.hpp"
 #include "nav/free_space.hpp"
 #include "nav/site_map.hpp"
 #include "planning/cover.hpp"
@@ -114,6 +115,21 @@ struct GnssCounts {
   std::uint64_t resets{};   // The localizer was lost and took the fixes' word.
 };
 
+// What the robot met while it drove.
+struct MovingFacts {
+  int legs{};
+  int obstacles_met{};   // Ways that had something in them: gone round, or given up.
+  double waited_s{};     // Standing before it.
+  double short_max_m{};  // The farthest from its goal that a leg ended which arrived.
+};
+
+// What the robot's battery gave, as reckoned from times and watts.
+struct EnergyFacts {
+  EnergyTimes spent;
+  double used_wh{}, left_wh{}, reserve_wh{};
+  ForecastError error;  // Of the minutes to the tour's end, foretold at each of its stops.
+};
+
 // What Phase II leaves at its end, and why.
 struct Leftover {
   planning::StopCertificate certificate;
@@ -186,6 +202,8 @@ struct RunRecord {
   RegistrationCounts registration;
   double mission_s{};
   double driven_total_m{};
+  MovingFacts moving;
+  EnergyFacts energy;
   std::vector<std::uint64_t> set_aside;       // SiteModel::voxels_set_aside at the end,
   std::vector<std::uint64_t> thin_set_aside;  // thin_set_aside
   std::vector<std::uint64_t> foliage;         // and foliage.

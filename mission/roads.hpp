@@ -15,12 +15,22 @@ class Roads {
   // Obstacles that the map lacks, as squares around their centres. The roadmap is built anew
   // without them, so that roads lead round them.
   void close(const std::vector<Eigen::Vector2d>& centers_m, double side_m);
+  // The same for what may go away again, until reopen(). What is closed there for the third time
+  // is closed for good, so that nothing is tried for ever.
+  void close_for_now(const std::vector<Eigen::Vector2d>& centers_m, double side_m);
+  bool reopen();  // False: nothing was closed for now.
 
   const nav::FreeArea& area() const { return area_; }
+  const nav::Polygons& mapped() const { return mapped_; }  // Drivable as the map has it.
   const nav::Roadmap& roadmap() const { return roadmap_; }
 
  private:
+  void rebuild();
+
   nav::FreeArea area_;
+  nav::Polygons mapped_;
+  nav::Polygons open_;  // Drivable but for what is closed for now.
+  nav::Polygons closed_for_now_, closed_once_, closed_twice_;
   double robot_radius_m_;
   nav::Roadmap roadmap_;
 };

@@ -235,6 +235,26 @@ json::object registration_json(const RegistrationCounts& counts) {
           {"moved_max_deg", degrees(counts.moved_max_rad)}};
 }
 
+json::object moving_json(const MovingFacts& moving) {
+  return {{"legs", moving.legs},
+          {"obstacles_met", moving.obstacles_met},
+          {"waited_s", mm(moving.waited_s)},
+          {"short_of_goal_max_m", mm(moving.short_max_m)}};
+}
+
+json::object energy_json(const EnergyFacts& energy) {
+  return {{"drive_s", mm(energy.spent.drive_s)},
+          {"scan_s", mm(energy.spent.scan_s)},
+          {"idle_s", mm(energy.spent.idle_s)},
+          {"used_wh", mm(energy.used_wh)},
+          {"left_wh", mm(energy.left_wh)},
+          {"reserve_wh", mm(energy.reserve_wh)},
+          {"forecasts", energy.error.forecasts},
+          {"forecast_error_mean_min", mm(energy.error.mean_abs_min)},
+          {"forecast_error_max_min", mm(energy.error.max_abs_min)},
+          {"forecast_error_mean_share", mm(energy.error.mean_share)}};
+}
+
 json::object sensor_json(const ScannerConfig& scanner) {
   return {{"height_m", scanner.height_m},
           {"range_min_m", scanner.range_min_m},
@@ -269,7 +289,9 @@ json::object summarise(const RunRecord& record, const ProductFacts& products) {
                        {"voxel_m", record.voxel_m},
                        {"gain_min_voxels", record.gain_min_voxels},
                        {"gnss", gnss_json(record.gnss)},
-                       {"registration", registration_json(record.registration)}};
+                       {"registration", registration_json(record.registration)},
+                       {"moving", moving_json(record.moving)},
+                       {"energy", energy_json(record.energy)}};
   summary["sensor"] = sensor_json(record.scanner);
   summary["radius_m"] = record.radius_m;
   summary["margin_m"] = record.margin_m;

@@ -51,14 +51,6 @@ json::object plan_json(const AreaPlan& plan) {
 
 }  // namespace
 
-struct Survey::Stop {
-  std::string name;
-  int task{};
-  hal::Pose2 pose;
-  const planning::Station* station{};  // Phase I
-  const NextView* view{};              // Phase II
-};
-
 Survey::Survey(const MissionConfig& config, const nav::SiteMap& map, SiteTasks tasks, int threads,
                Parts parts)
     : config_(config),
@@ -72,7 +64,8 @@ Survey::Survey(const MissionConfig& config, const nav::SiteMap& map, SiteTasks t
       matcher_(config.localize.match_map ? std::make_unique<MapMatcher>(map, config.robot.scanner)
                                          : nullptr),
       registrar_(config.registration, config.robot.scanner, threads),
-      spool_(ScanSpool::open(parts.store.folder()).value()) {
+      spool_(ScanSpool::open(parts.store.folder()).value()),
+      energy_(config.robot.battery, config.robot.scanner.scan_s) {
   record_.mission = config.name;
   record_.site = map.name;
   record_.robot = config.robot.name;
@@ -108,6 +101,8 @@ hal::Task<void> Survey::run() {
   note_sensors();
   note_gnss();
   note_registration();
+  note_moving();
+  note_energy();
   record_.set_aside = model_->voxels_set_aside();
   record_.thin_set_aside = model_->thin_set_aside();
   record_.foliage = model_->foliage();
@@ -159,6 +154,15 @@ void Survey::note_box() {
     record_.notes.push_back(fmt::format(
         "{} of {} points lie outside the voxel box: raise [phase2] height_max_m or margin_m",
         outside, points));
+}
+
+void Survey::note_moving() {
+  const MovingFacts& moving = record_.moving;
+  if (moving.obstacles_met > 0 || moving.waited_s >= 1)
+    record_.notes.push_back(
+        fmt::format("something that the map lacks was in the way on {} of {} ways; the robot "
+                    "waited {:.0f} s before it in all",
+                    moving.obstacles_met, moving.legs, moving.waited_s));
 }
 
 // Fixes that the localizer would not follow, and the times when it had to.
@@ -220,6 +224,7 @@ hal::Task<void> Survey::tour(std::size_t t) {
     ++stations_done_;
     covered_m_ += station.adds_m;
   }
+  if (static_cast<int>(t) == tasks_.start_area) note_forecasts();
 }
 
 hal::Task<void> Survey::refine() {
@@ -243,10 +248,12 @@ hal::Task<void> Survey::refine() {
     }
     const bool done = co_await take_best_of(views);
     views_taken_ += done;
-    const bool some_not_faced = config_.phase2.choose == "gain" && !views.empty();
+    const bool some_not_faced = config_.phase2.choose == "gain" && !views.empty() && !battery_low_;
     if (!done && !some_not_faced) {
       co_await close_tour();
-      std::string reason = "none of the views that would add enough can be reached";
+      std::string reason =
+          battery_low_ ? "the battery has to take the robot home: " + record_.dropped.back().reason
+                       : "none of the views that would add enough can be reached";
       co_await leave(std::move(reason), false);
       co_return;
     }
@@ -274,7 +281,7 @@ hal::Task<bool> Survey::take_best_of(std::vector<NextView>& views) {
                     .station = nullptr,
                     .view = &view};
     const bool done = co_await visit(stop);
-    if (done) co_return true;
+    if (done || battery_low_) co_return done;
   }
 }
 
@@ -298,6 +305,7 @@ hal::Task<bool> Survey::visit(const Stop& stop) {
     scan.adds_m = stop.station->adds_m;
     scan.overlaps_m = stop.station->overlaps_m;
   }
+  if (!scan.by_hand && !affords(stop)) co_return false;
   const bool there = scan.by_hand ? co_await carry(stop, scan) : co_await drive(stop, scan);
   if (!there) co_return false;
   const bool scanned = co_await acquire(stop, std::move(scan));
@@ -310,24 +318,40 @@ hal::Task<bool> Survey::drive(const Stop& stop, ScanRecord& scan) {
                            task(tasks_.start_area).area.name, task(stop.task).area.name));
     co_return false;
   }
+  const double began_s = now_s();
   const LegEnd leg =
       co_await pilot_.drive_to(roads_[static_cast<std::size_t>(stop.task)], stop.pose);
+  energy_.drove(now_s() - began_s);
   scan.driven_m = leg.driven_m;
   record_.driven_total_m += leg.driven_m;
   record_.driven_m.push_back(leg.track_m);
+  note_leg(leg);
   decide({{"t_s", now_s()},
           {"decision", "leg"},
           {"to", stop.name},
           {"arrived", leg.arrived},
           {"driven_m", leg.driven_m},
+          {"short_of_goal_m", leg.short_of_goal_m},
+          {"obstacles_met", leg.obstacles_met},
+          {"waited_s", leg.waited_s},
           {"reason", leg.reason}});
   if (leg.drive_lost) throw CannotGoOn(fmt::format("on the way to {}: {}", stop.name, leg.reason));
   if (!leg.arrived) drop(stop, leg.reason);
   co_return leg.arrived;
 }
 
+void Survey::note_leg(const LegEnd& leg) {
+  MovingFacts& moving = record_.moving;
+  ++moving.legs;
+  moving.obstacles_met += leg.obstacles_met;
+  moving.waited_s += leg.waited_s;
+  if (leg.arrived) moving.short_max_m = std::max(moving.short_max_m, leg.short_of_goal_m);
+}
+
 hal::Task<bool> Survey::carry(const Stop& stop, ScanRecord& scan) {
+  const double began_s = now_s();
   const auto placed = co_await parts_.devices.placement.place(task(stop.task).area.name, stop.pose);
+  energy_.stood(now_s() - began_s);
   if (!placed) {
     drop(stop, fmt::format("nobody can set up the scanner there: {}", placed.error().message()));
     co_return false;
@@ -345,9 +369,14 @@ hal::Task<bool> Survey::acquire(const Stop& stop, ScanRecord scan) {
   scan.start_s = now_s();
   const int takes = config_.registration.scans && config_.registration.retake ? 2 : 1;
   for (int take = 1;; ++take) {
+    const double began_s = now_s();
     const std::optional<hal::ScanCloud> cloud = co_await take_scan(stop);
-    if (!cloud) co_return false;
+    if (!cloud) {
+      energy_.stood(now_s() - began_s);
+      co_return false;
+    }
     scan.end_s = now_s();
+    energy_.scanned(scan.end_s - began_s);
     scan.stamp = cloud->stamp;
     note_sensors();
     co_await match_map(*cloud, scan);

@@ -11,6 +11,7 @@
 #include "hal/compute.hpp"
 #include "hal/devices.hpp"
 #include "mission/config.hpp"
+#include "mission/energy.hpp"
 #include "mission/map_match.hpp"
 #include "mission/pilot.hpp"
 #include "mission/plan.hpp"
@@ -51,7 +52,14 @@ class Survey {
   const CloudMerger& cloud() const { return cloud_; }
 
  private:
-  struct Stop;  // Where the next scan is to be taken, and why.
+  // Where the next scan is to be taken, and why.
+  struct Stop {
+    std::string name;
+    int task{};
+    hal::Pose2 pose;
+    const planning::Station* station{};  // Phase I
+    const NextView* view{};              // Phase II
+  };
 
   hal::Task<void> survey();
   hal::Task<void> plan_stations();
@@ -62,6 +70,14 @@ class Survey {
   std::string why_no_scan() const;
   void note_box();
   void note_gnss();
+  void note_moving();
+  void note_leg(const LegEnd& leg);
+  // In survey_energy.cpp.
+  double way_s(const hal::Pose2& from, const hal::Pose2& to) const;
+  std::vector<double> legs_ahead_s(const Stop& stop);
+  bool affords(const Stop& stop);
+  void note_forecasts();
+  void note_energy();
 
   hal::Task<bool> visit(const Stop& stop);
   hal::Task<bool> drive(const Stop& stop, ScanRecord& scan);
@@ -123,6 +139,10 @@ class Survey {
   int stops_without_scan_{};  // In a row.
   double covered_m_{};
   double target_m_{};
+  EnergyBook energy_;
+  std::vector<double> tour_legs_s_;  // Drives from station to station of the robot's tour.
+  std::size_t tours_next_{};         // Station of it after the one that is next.
+  bool battery_low_{};               // For the last stop that was thought of.
   CloudMerger cloud_;
   RunRecord record_;
 };

@@ -39,7 +39,7 @@ struct Options {
 // Where a client finds the units: what goes into the robot file's `link` keys.
 struct Served {
   std::unique_ptr<drivers::SocketCan> can, second_can;
-  std::unique_ptr<vantage::ServedTcp> scanner, battery, safety;
+  std::unique_ptr<vantage::ServedTcp> scanner, obstacles, battery, safety;
   std::unique_ptr<vantage::ServedPty> scanner_line, pan, imu, gnss, board;
   std::unique_ptr<vantage::ServedUdp> packets;
   std::unique_ptr<vantage::ServedTcp> gpsd;
@@ -72,6 +72,7 @@ Served serve(const Options& options, const mission::RobotConfig& robot, asio::io
   else
     served.scanner = port();
   if (mission::needs_pan(robot.scanner)) served.pan = pty("pan", kPanBaud);
+  if (robot.obstacles.device != "none") served.obstacles = port();
   served.imu = pty("imu", kImuBaud);
   if (robot.gnss.device == "gpsd")
     served.gpsd = port();
@@ -103,6 +104,9 @@ void print_links(const Options& options, const mission::RobotConfig& robot, cons
   fmt::print("[scanner]\ndevice = \"{}\"\nlink = \"{}\"\n", robot.scanner.device,
              scanner_link(served));
   if (served.pan) fmt::print("[pan]\nlink = \"{}\"\n", serial(*served.pan, kPanBaud));
+  if (served.obstacles)
+    fmt::print("[obstacles]\ndevice = \"{}\"\nlink = \"{}\"\n", robot.obstacles.device,
+               tcp(*served.obstacles));
   fmt::print("[imu]\nlink = \"{}\"\n[gnss]\ndevice = \"{}\"\nlink = \"{}\"\n",
              serial(*served.imu, kImuBaud), robot.gnss.device,
              served.gpsd ? tcp(*served.gpsd) : serial(*served.gnss, kGnssBaud));
@@ -175,6 +179,7 @@ int run(const Options& options) {
        .pan = served.pan.get(),
        .imu = served.imu.get(),
        .gnss = served.gpsd ? static_cast<hal::ByteStream*>(served.gpsd.get()) : served.gnss.get(),
+       .obstacles = served.obstacles.get(),
        .packets = served.packets.get()});
   print_links(options, robot, served);
 

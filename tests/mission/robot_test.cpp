@@ -83,6 +83,7 @@ INSTANTIATE_TEST_SUITE_P(All, ShippedRobot,
                                          Shipped{"bunker_vlp16.toml", 0.95, 1e4},
                                          Shipped{"scout_ouster.toml", 0.97, 1e4},
                                          Shipped{"scout_hokuyo.toml", 0.97, 1e5},
+                                         Shipped{"scout_looking.toml", 0.96, 1e5},
                                          Shipped{"mini_lms111.toml", 0.95, 1e5}),
                          [](const auto& param) {
                            const std::string name = param.param.robot;

@@ -86,21 +86,78 @@ class Scanner final : public hal::Scanner {
   const hal::ScanPattern pattern_;
 };
 
+// Looks level all round but for a quarter behind, ten times a second.
+class Obstacles final : public hal::ProfileScanner {
+ public:
+  Obstacles(sim::World& world, hal::Clock& clock) : world_(world), clock_(clock) {}
+
+  hal::Task<hal::Result<void>> start() override {
+    on_ = !broken;
+    co_return hal::Result<void>{};
+  }
+  hal::Task<hal::Result<void>> stop() override {
+    on_ = false;
+    co_return hal::Result<void>{};
+  }
+  hal::Task<hal::Result<hal::Profile>> next_profile() override {
+    co_await clock_.sleep_until(next_multiple(clock_.now(), std::chrono::milliseconds(100)));
+    if (!on_ || broken)
+      co_return boost::system::errc::make_error_code(boost::system::errc::operation_not_permitted);
+    world_.advance(clock_.now());
+    co_return look();
+  }
+  bool broken = false;
+
+ private:
+  static constexpr int kBeams = 271;
+  static constexpr double kHeightM = 0.3, kReachM = 10;
+
+  hal::Profile look() const {
+    hal::Profile profile{.stamp = clock_.now(),
+                         .beam_period_s = 0,
+                         .angle_first_rad = -0.75 * M_PI,
+                         .angle_step_rad = 1.5 * M_PI / (kBeams - 1),
+                         .ranges_m = std::vector<float>(kBeams),
+                         .intensities = {},
+                         .lost_before = 0};
+    const Eigen::Isometry3d T_W_S = world_.robot().T_W_S(kHeightM);
+    for (int i = 0; i < kBeams; ++i) {
+      const double angle = profile.angle_first_rad + i * profile.angle_step_rad;
+      const Eigen::Vector3d W_direction =
+          T_W_S.linear() * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
+      const auto hit = world_.scene().cast(T_W_S.translation(), W_direction, 0.05, kReachM);
+      double range_m = world_.range_to_people_m(T_W_S.translation(), W_direction);
+      if (hit) range_m = std::min(range_m, hit->distance_m);
+      profile.ranges_m[static_cast<std::size_t>(i)] =
+          range_m <= kReachM ? static_cast<float>(range_m) : 0.0F;
+    }
+    return profile;
+  }
+
+  sim::World& world_;
+  hal::Clock& clock_;
+  bool on_ = false;
+};
+
 struct Robot {
   Robot(sim::World& world, hal::Clock& clock)
       : drive(world, clock),
         imu(world, clock),
         gnss(world, clock),
         scanner(world, clock),
-        placement(world, clock) {}
+        placement(world, clock),
+        obstacles(world, clock) {}
 
   hal::Devices devices() { return {drive, imu, gnss, scanner, placement}; }
+  // The same for a robot that sees what is in its way.
+  hal::Devices seeing_devices() { return {drive, imu, gnss, scanner, placement, {}, &obstacles}; }
 
   Drive drive;
   Imu imu;
   Gnss gnss;
   Scanner scanner;
   sim::SimPlacement placement;
+  Obstacles obstacles;
 };
 
 }  // namespace direct
