@@ -1,4 +1,6 @@
 // How a survey keeps enough of the battery to come home, and what it foretells.
+#include <algorithm>
+
 #include "mission/survey.hpp"
 
 namespace mission {
@@ -70,7 +72,9 @@ void Survey::note_forecasts() {
           {"mean_share", error.mean_share}});
 }
 
+// What is neither driving nor scanning is standing: planning, waiting for devices.
 void Survey::note_energy() {
+  energy_.stood(std::max(0.0, record_.mission_s - energy_.spent().total_s()));
   record_.energy.spent = energy_.spent();
   record_.energy.used_wh = energy_.used_wh();
   record_.energy.left_wh = energy_.left_wh();
