@@ -197,13 +197,8 @@ SimBackend::SimBackend(const MissionConfig& config, const SiteTasks& tasks, SimS
             robot_.drivers().drive()),
       scanner_(robot_.drivers().scanner(), true_site_.world(), clock_),
       placement_(true_site_.world(), clock_),
-      devices_{gate_,
-               robot_.drivers().imu(),
-               robot_.drivers().gnss(),
-               scanner_,
-               placement_,
-               [this] { return complaints(); },
-               robot_.drivers().obstacles()} {}
+      devices_{gate_,      robot_.drivers().imu(),          robot_.drivers().gnss(),     scanner_,
+               placement_, [this] { return complaints(); }, robot_.drivers().obstacles()} {}
 
 std::string SimBackend::complaints() {
   const std::string gate = gate_.why(), all = robot_.drivers().complaints();
