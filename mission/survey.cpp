@@ -379,9 +379,11 @@ hal::Task<bool> Survey::acquire(const Stop& stop, ScanRecord scan) {
     energy_.scanned(scan.end_s - began_s);
     scan.stamp = cloud->stamp;
     note_sensors();
-    co_await match_map(*cloud, scan);
+    const MapSays map = co_await match_map(*cloud, scan);
     const ScanBelief belief = note_pose(scan);
-    const std::function<void()> fit = [&] { register_scan(*cloud, belief, scan, take == takes); };
+    const std::function<void()> fit = [&] {
+      register_scan(*cloud, belief, scan, map, take == takes);
+    };
     co_await parts_.compute.run(fit);
     const bool again = scan.fit.verdict == ScanVerdict::refused && take < takes;
     note_verdict(scan, again);

@@ -90,10 +90,11 @@ class Survey {
 
   // survey_register.cpp
   ScanBelief note_pose(ScanRecord& scan) const;
-  hal::Task<void> match_map(const hal::ScanCloud& cloud, const ScanRecord& scan);
+  enum class MapSays { nothing, here, elsewhere };  // Of where a scan was taken.
+  hal::Task<MapSays> match_map(const hal::ScanCloud& cloud, const ScanRecord& scan);
   void note_sensors();
   void register_scan(const hal::ScanCloud& cloud, const ScanBelief& belief, ScanRecord& scan,
-                     bool last);
+                     MapSays map, bool last);
   void try_to_register(const ScanBelief& belief, ScanRecord& scan, bool other_guesses);
   void tell_localizer(const ScanRecord& scan);
   void note_verdict(const ScanRecord& scan, bool again);

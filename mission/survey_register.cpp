@@ -85,8 +85,8 @@ void Survey::note_sensors() {
 
 // The walls that the scan shows, over those of the map. Tells the localizer, which refuses what it
 // is sure against.
-hal::Task<void> Survey::match_map(const hal::ScanCloud& cloud, const ScanRecord& scan) {
-  if (!matcher_ || scan.by_hand) co_return;
+hal::Task<Survey::MapSays> Survey::match_map(const hal::ScanCloud& cloud, const ScanRecord& scan) {
+  if (!matcher_ || scan.by_hand) co_return MapSays::nothing;
   nav::ScanMatch match;
   const std::function<void()> lay = [&, guess = pilot_.pose()] {
     match = matcher_->match(scan_points(cloud, Eigen::Isometry3d::Identity()), guess);
@@ -110,15 +110,29 @@ hal::Task<void> Survey::match_map(const hal::ScanCloud& cloud, const ScanRecord&
           {"sigma_x_m", std::sqrt(match.covariance(0, 0))},
           {"sigma_y_m", std::sqrt(match.covariance(1, 1))},
           {"sigma_heading_deg", in_degrees(std::sqrt(match.covariance(2, 2)))}});
+  if (!match.good) co_return MapSays::nothing;
+  co_return used ? MapSays::here : MapSays::elsewhere;
 }
 
 // By the localizer's guess, and if that fails once by others.
 void Survey::register_scan(const hal::ScanCloud& cloud, const ScanBelief& belief, ScanRecord& scan,
-                           bool last) {
+                           MapSays map, bool last) {
   if (!config_.registration.scans) return;
+  const bool contradicted = scan.fit.verdict == ScanVerdict::refused;  // The take before this.
   registrar_.take(scan_points(cloud, Eigen::Isometry3d::Identity()));
   try_to_register(belief, scan, false);
   if (scan.fit.references == 0 && !attempt_.pairs.empty()) try_to_register(belief, scan, true);
+  // A scan may lie, and so may the map: where they differ it is taken again, and then the map is no
+  // reason to refuse it.
+  if (map == MapSays::elsewhere && !last) {
+    scan.fit.verdict = ScanVerdict::refused;
+    scan.fit.reason = "its walls lie beside those of the map";
+  }
+  // From the same place: what contradicted the others a moment ago has to fit them now, or the map.
+  if (contradicted && map != MapSays::here && scan.fit.verdict == ScanVerdict::alone) {
+    scan.fit.verdict = attempt_.fit.verdict = ScanVerdict::refused;
+    scan.fit.reason = "the take before was contradicted, and nothing speaks for this one";
+  }
   if (scan.fit.verdict == ScanVerdict::refused && !last) return;
   registrar_.keep(scan.number, belief, attempt_);
 }

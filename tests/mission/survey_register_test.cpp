@@ -206,4 +206,16 @@ TEST(SurveyRegisters, AScanThatContradictsTheOthersIsTakenAgain) {
   EXPECT_TRUE(mission.filled_anew().map() == mission.survey().model().map());
 }
 
+TEST(SurveyRegisters, AScanThatContradictsTheOthersTwiceIsNotMerged) {
+  const int number = first_accepted();
+  const Mission mission({number, number + 1});
+  const mission::RunRecord& record = mission.record();
+  ASSERT_TRUE(record.completed) << record.end;
+  EXPECT_EQ(record.registration.retaken, 1);
+  EXPECT_EQ(record.registration.refused, 1);
+  EXPECT_EQ(record.scans[static_cast<std::size_t>(number) - 1].fit.verdict, ScanVerdict::refused);
+  EXPECT_THAT(record.notes, testing::Contains(testing::HasSubstr("was not merged")));
+  EXPECT_TRUE(mission.filled_anew().map() == mission.survey().model().map());
+}
+
 }  // namespace
