@@ -199,9 +199,9 @@ void Survey::note_verdict(const ScanRecord& scan, bool again) {
 
 // All pairs that overlap together; where that moves any pose, the map is filled anew.
 hal::Task<void> Survey::close_tour() {
-  const bool nothing_new = scans_closed_ == static_cast<int>(record_.scans.size());
+  const int scans = static_cast<int>(record_.scans.size());
+  const bool nothing_new = std::exchange(scans_closed_, scans) == scans;
   if (!config_.registration.scans || !config_.registration.tour_end || nothing_new) co_return;
-  scans_closed_ = static_cast<int>(record_.scans.size());
   bool moved = false;
   const std::function<void()> close = [&] {
     moved = fit_tour();

@@ -26,8 +26,8 @@ class RouteCommand : public test::VantageTest {
         "coordinates":[[[40,0],[41,0],[41,20],[40,20],[40,0]]]}}]})");
   }
   Outcome route(const std::string& from, const std::string& to, const std::string& more = "") {
-    return run("route --site " + (folder_.path() / "site").string() + " --from=" + from +
-               " --to=" + to + " " + more);
+    return run("route --site " + (folder_.path() / "site").string() + " '--from=" + from +
+               "' '--to=" + to + "' " + more);
   }
 };
 

@@ -38,11 +38,14 @@ class Views : public test::VantageTest {
     shared_ = nullptr;
   }
 
+  // The map stays as it was when each view was chosen: no tour is closed.
   static void write_mission(const std::string& name, int views_max, const std::string& more = "") {
     std::ofstream(shared_->path() / (name + ".toml"))
         << "robot = 'r.toml'\nsite = '" << site("courtyard") << "'\n"
-        << more << "[phase1]\ngain_min = 0.01\n[phase2]\nheight_m = 52.0\nviews_max = " << views_max
-        << "\n";
+        << more
+        << "[register]\ntour_end = false\n[phase1]\ngain_min = 0.01\n[phase2]\nheight_m = "
+           "52.0\nviews_max = "
+        << views_max << "\n";
   }
   static std::string mission(const std::string& name) {
     return (shared_->path() / (name + ".toml")).string();
