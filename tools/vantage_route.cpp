@@ -184,7 +184,7 @@ void add_route_command(CLI::App& app, Run& run) {
       "Finds the way that the robot would drive: how long, how narrow, what time it takes");
   command->footer(
       "Examples:\n"
-      "  vantage route --site configs/sites/church --from 30,-20 --to -30,20\n"
+      "  vantage route --site configs/sites/church --from 5,0 --to 29,-9\n"
       "  vantage route --site path/to/folder --from 0,0 --to 12.5,-8 --svg way.svg --json\n"
       "Exit: 0 fine, 2 refused (every reason is on stderr, one a line).");
   add_site_options(*command, options->site);
