@@ -128,8 +128,7 @@ hal::Task<void> Survey::survey() {
 std::string Survey::why_no_scan() const {
   if (record_.dropped.empty())
     return "not one scan was taken: the plan has no stations, for no wall of the map can be "
-           "scanned "
-           "from where the robot can stand";
+           "scanned from where the robot can stand";
   const DroppedStation& last = record_.dropped.back();
   return fmt::format("not one scan was taken; the last of {} dropped stations, {}: {}",
                      record_.dropped.size(), last.name, last.reason);
