@@ -9,6 +9,10 @@ namespace hal {
 // 3 * kDeg is three degrees in radians.
 inline constexpr double kDeg = std::numbers::pi / 180;
 
+constexpr double radians(double degrees) {
+  return degrees * std::numbers::pi / 180;
+}
+
 // The same direction in [-pi, pi].
 inline double wrapped(double angle_rad) {
   return std::remainder(angle_rad, 2 * std::numbers::pi);

@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "drivers/agilex_drive.hpp"
 #include "drivers/cia402_drive.hpp"
@@ -17,6 +16,7 @@
 #include "drivers/ublox.hpp"
 #include "drivers/velodyne.hpp"
 #include "drivers/vn100.hpp"
+#include "hal/angles.hpp"
 #include "hal/together.hpp"
 #include "mission/main_scanner.hpp"
 
@@ -25,10 +25,6 @@ namespace {
 
 constexpr int kObstacleTurnsSkipped = 3;  // Of 40 a second.
 constexpr hal::Duration kLook = std::chrono::milliseconds(100);
-
-constexpr double radians(double degrees) {
-  return degrees * std::numbers::pi / 180;
-}
 
 // Where a link can change its rate, its own file says so; in memory there is none to change.
 drivers::AgilexDrive::Model agilex_model(const std::string& device) {
@@ -46,8 +42,8 @@ drivers::Cia402Drive::Config cia402_config(const RobotConfig& config) {
                   drive.right_counts_per_m};
   result.track_m = config.body.track_m;
   // A wheel on the outside of a turn runs faster than the robot.
-  result.speed_max_mps =
-      config.body.speed_max_mps + radians(config.body.turn_max_degps) * config.body.track_m / 2;
+  result.speed_max_mps = config.body.speed_max_mps +
+                         hal::radians(config.body.turn_max_degps) * config.body.track_m / 2;
   return result;
 }
 
@@ -130,7 +126,7 @@ void RobotDrivers::add_sweep(const RobotConfig& config, const Links& links,
                              std::function<double()> clock_jitter_s) {
   drivers::FlirPtuConfig ptu;
   ptu.counter_clockwise = config.pan.counter_clockwise;
-  ptu.angle_max_rad = radians(config.pan.angle_max_deg);
+  ptu.angle_max_rad = hal::radians(config.pan.angle_max_deg);
   ptu.angle_min_rad = -ptu.angle_max_rad;
   ptu.acceleration_radps2 = kPanAcceleration_radps2;
   auto& pan =

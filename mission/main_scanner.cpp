@@ -6,15 +6,13 @@
 #include <cmath>
 #include <numbers>
 
+#include "hal/angles.hpp"
 #include "mission/files.hpp"
 #include "mission/main_robot.hpp"
 
 namespace mission {
 namespace {
 
-constexpr double radians(double degrees) {
-  return degrees * std::numbers::pi / 180;
-}
 constexpr double degrees(double radians) {
   return radians * 180 / std::numbers::pi;
 }
@@ -32,8 +30,8 @@ constexpr Arc kLms1xx{-45, 225}, kLms5xx{-5, 185};
 drivers::MirrorField mirror_of(const drivers::LmsSettings& settings) {
   const double step_deg = settings.resolution_1e4deg / 1e4;
   const double turn_s = 100.0 / settings.frequency_centihz;
-  return {.angle_first_rad = radians(settings.start_1e4deg / 1e4 - 90),
-          .angle_step_rad = radians(step_deg),
+  return {.angle_first_rad = hal::radians(settings.start_1e4deg / 1e4 - 90),
+          .angle_step_rad = hal::radians(step_deg),
           .beams = static_cast<std::uint32_t>(
               std::lround((settings.stop_1e4deg - settings.start_1e4deg) / 1e4 / step_deg) + 1),
           .beam_period_s = turn_s * step_deg / 360,
@@ -167,17 +165,17 @@ bool needs_pan(const ScannerConfig& scanner) {
 }
 
 drivers::SweepMount mount_of(const ScannerConfig& scanner) {
-  return {.tilt_rad = radians(scanner.tilt_deg),
-          .roll_rad = radians(scanner.roll_deg),
-          .yaw_rad = radians(scanner.yaw_deg),
+  return {.tilt_rad = hal::radians(scanner.tilt_deg),
+          .roll_rad = hal::radians(scanner.roll_deg),
+          .yaw_rad = hal::radians(scanner.yaw_deg),
           .P_offset_m = {scanner.offset_x_m, scanner.offset_y_m, scanner.offset_z_m}};
 }
 
 drivers::SweepField field_of(const ScannerConfig& scanner) {
-  return {.fov_rad = radians(scanner.fov_deg),
-          .elevation_min_rad = radians(scanner.elevation_min_deg),
-          .elevation_max_rad = radians(scanner.elevation_max_deg),
-          .azimuth_step_rad = radians(scanner.azimuth_step_deg)};
+  return {.fov_rad = hal::radians(scanner.fov_deg),
+          .elevation_min_rad = hal::radians(scanner.elevation_min_deg),
+          .elevation_max_rad = hal::radians(scanner.elevation_max_deg),
+          .azimuth_step_rad = hal::radians(scanner.azimuth_step_deg)};
 }
 
 // The whole arc where half a turn of the pan axis then shows all; else no more than is wanted.

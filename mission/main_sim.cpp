@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <boost/asio/co_spawn.hpp>
 #include <cmath>
-#include <numbers>
 
 #include "hal/angles.hpp"
 #include "hal/together.hpp"
@@ -19,10 +18,6 @@
 
 namespace mission {
 namespace {
-
-constexpr double radians(double degrees) {
-  return degrees * std::numbers::pi / 180;
-}
 
 // A ground sample every so far is enough to tell whether a model has a ground.
 constexpr double kGroundSampleM = 4.0;
@@ -39,11 +34,11 @@ sim::ScannerModel scanner_model(const RobotConfig& robot) {
   return {.height_m = scanner.height_m,
           .range_min_m = scanner.range_min_m,
           .range_max_m = scanner.range_max_m,
-          .fov_rad = radians(scanner.fov_deg),
-          .azimuth_step_rad = radians(scanner.azimuth_step_deg),
-          .elevation_min_rad = radians(scanner.elevation_min_deg),
-          .elevation_max_rad = radians(scanner.elevation_max_deg),
-          .elevation_step_rad = radians(scanner.elevation_step_deg),
+          .fov_rad = hal::radians(scanner.fov_deg),
+          .azimuth_step_rad = hal::radians(scanner.azimuth_step_deg),
+          .elevation_min_rad = hal::radians(scanner.elevation_min_deg),
+          .elevation_max_rad = hal::radians(scanner.elevation_max_deg),
+          .elevation_step_rad = hal::radians(scanner.elevation_step_deg),
           .scan_s = scanner.scan_s,
           .range_sigma_m = robot.sim.range_sigma_m};
 }
@@ -87,10 +82,10 @@ sim::WorldConfig world_config(const MissionConfig& config, const SiteTasks& task
   world.radius_m = robot.body.radius_m;
   world.track_m = robot.body.track_m;
   world.speed_max_mps = robot.body.speed_max_mps;
-  world.turn_max_radps = radians(robot.body.turn_max_degps);
+  world.turn_max_radps = hal::radians(robot.body.turn_max_degps);
   world.slip_sigma = robot.sim.slip_sigma;
-  world.gyro_sigma_radps = radians(robot.sim.gyro_sigma_degps);
-  world.gyro_bias_sigma_radps = radians(robot.sim.gyro_bias_degps);
+  world.gyro_sigma_radps = hal::radians(robot.sim.gyro_sigma_degps);
+  world.gyro_bias_sigma_radps = hal::radians(robot.sim.gyro_bias_degps);
   world.gnss_sigma_m = robot.sim.gnss_sigma_m;
   for (const AreaTask& task : tasks.tasks) {
     if (robot.sim.gnss_outage.empty() || task.area.region != robot.sim.gnss_outage) continue;
@@ -100,7 +95,7 @@ sim::WorldConfig world_config(const MissionConfig& config, const SiteTasks& task
     }
   }
   world.placement_sigma_m = robot.sim.placement_sigma_m;
-  world.placement_heading_sigma_rad = radians(robot.sim.placement_heading_sigma_deg);
+  world.placement_heading_sigma_rad = hal::radians(robot.sim.placement_heading_sigma_deg);
   world.placement_s = robot.sim.placement_s;
   world.scanner = scanner_model(robot);
   world.ground_z_m = start_ground_z_m(tasks);
@@ -334,9 +329,9 @@ void SimBackend::judge_surface(const RunRecord& record, const SiteModel& model,
        .nz = grid.nz},
       {.range_min_m = scanner.range_min_m,
        .range_max_m = scanner.range_max_m,
-       .grazing_max_rad = radians(scanner.grazing_max_deg),
-       .elevation_min_rad = radians(scanner.elevation_min_deg),
-       .elevation_max_rad = radians(scanner.elevation_max_deg)},
+       .grazing_max_rad = hal::radians(scanner.grazing_max_deg),
+       .elevation_min_rad = hal::radians(scanner.elevation_min_deg),
+       .elevation_max_rad = hal::radians(scanner.elevation_max_deg)},
       positions, record.scans.size(),
       [&](int x, int y, int z) {
         return model.map().at({x, y, z}) == planning::VoxelState::seen_occupied;

@@ -1,7 +1,6 @@
 #include "mission/main_units.hpp"
 
-#include <numbers>
-
+#include "hal/angles.hpp"
 #include "hal/together.hpp"
 #include "mission/main_scanner.hpp"
 
@@ -11,10 +10,6 @@ namespace {
 constexpr double kArcsecPerStep = 46.2857;  // A PTU-E46-70 in half steps.
 constexpr double kObstacleRangeMax_m = 20;  // Of a UST-20LX.
 constexpr double kShortRangeMax_m = 65;     // What an LMS5xx can tell in millimetres.
-
-constexpr double radians(double degrees) {
-  return degrees * std::numbers::pi / 180;
-}
 
 drivers::agilex::Limits limits_of(const std::string& device) {
   return device == "agilex-scout2" ? drivers::agilex::kScout2 : drivers::agilex::kScoutMini;
@@ -78,7 +73,7 @@ void RobotUnits::add_sweep(const RobotConfig& config, int threads, const UnitLin
   sim::FlirPtuUnitConfig ptu;
   ptu.arcsec_per_step = kArcsecPerStep;
   ptu.counter_clockwise = config.pan.counter_clockwise;
-  ptu.angle_max_rad = radians(config.pan.angle_max_deg);
+  ptu.angle_max_rad = hal::radians(config.pan.angle_max_deg);
   ptu.reset_time = {};  // It was on before the computer was.
   ptu.seed = seed_;
   ptu_.emplace(ptu, clock_, *links.pan, add_faults("pan"));

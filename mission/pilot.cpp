@@ -5,6 +5,7 @@
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <numbers>
 
+#include "hal/angles.hpp"
 #include "nav/polygons.hpp"
 
 namespace mission {
@@ -32,15 +33,11 @@ constexpr hal::Duration kAskAgain = std::chrono::milliseconds(200);
 
 namespace errc = boost::system::errc;
 
-constexpr double radians(double degrees) {
-  return degrees * std::numbers::pi / 180;
-}
-
 nav::LocalizerConfig localizer_config(const RobotConfig& robot) {
   nav::LocalizerConfig config;
   config.track_m = robot.body.track_m;
   config.slip_sigma = robot.sim.slip_sigma;
-  config.gyro_sigma_radps = radians(robot.sim.gyro_sigma_degps);
+  config.gyro_sigma_radps = hal::radians(robot.sim.gyro_sigma_degps);
   return config;
 }
 
@@ -48,7 +45,7 @@ nav::LocalizerConfig localizer_config(const RobotConfig& robot) {
 hal::Duration time_allowed(const BodyConfig& body, const nav::Route& route) {
   return hal::from_seconds(60 + 3 * route.length_m / body.speed_max_mps +
                            static_cast<double>(route.points_m.size()) * 2 * std::numbers::pi /
-                               radians(body.turn_max_degps));
+                               hal::radians(body.turn_max_degps));
 }
 
 bool is_held(boost::system::error_code why) {
@@ -69,7 +66,7 @@ std::string drive_reason(boost::system::error_code why, hal::Duration waited,
 
 // The start pose comes from survey marks or the operator's care: a few centimetres, a degree.
 Eigen::Matrix3d start_covariance() {
-  return Eigen::Vector3d{0.05 * 0.05, 0.05 * 0.05, radians(1) * radians(1)}.asDiagonal();
+  return Eigen::Vector3d{0.05 * 0.05, 0.05 * 0.05, hal::radians(1) * hal::radians(1)}.asDiagonal();
 }
 
 }  // namespace
@@ -86,7 +83,7 @@ nav::ZoneConfig zone_config(const BodyConfig& body) {
 nav::FollowConfig follow_config(const BodyConfig& body) {
   nav::FollowConfig config;
   config.speed_max_mps = body.speed_max_mps;
-  config.turn_max_radps = radians(body.turn_max_degps);
+  config.turn_max_radps = hal::radians(body.turn_max_degps);
   config.robot_radius_m = body.radius_m;
   config.period_s = hal::seconds(kControlPeriod);
   return config;

@@ -257,7 +257,7 @@ hal::Task<void> a_dialogue_survives_a_cut_at_any_call(CanRig& rig) {
   }
 }
 
-constexpr Promise<CanRig> kPromises[] = {
+constexpr Promise<CanRig> kCanPromises[] = {
     {"FramesArriveWholeAndInOrder", arrive_whole_and_in_order},
     {"FramesGoBothWaysAtOnce", go_both_ways_at_once},
     {"NobodyHearsHimself", nobody_hears_himself},
@@ -275,7 +275,7 @@ constexpr Promise<CanRig> kPromises[] = {
 }  // namespace
 
 std::span<const Promise<CanRig>> can_promises() {
-  return kPromises;
+  return kCanPromises;
 }
 
 }  // namespace links_test

@@ -77,7 +77,7 @@ hal::Task<void> waiting_costs_nothing(DatagramRig& rig) {
   require(rested.index() == 1, "something came");
 }
 
-constexpr Promise<DatagramRig> kPromises[] = {
+constexpr Promise<DatagramRig> kDatagramPromises[] = {
     {"DatagramsArriveWholeAndInOrder", arrive_whole_and_in_order},
     {"DatagramsAreStampedWhenTheyArrive", are_stamped_when_they_arrive},
     {"TooLongOnesAreToldAndGone", too_long_ones_are_told_and_gone},
@@ -89,7 +89,7 @@ constexpr Promise<DatagramRig> kPromises[] = {
 }  // namespace
 
 std::span<const Promise<DatagramRig>> datagram_promises() {
-  return kPromises;
+  return kDatagramPromises;
 }
 
 }  // namespace links_test

@@ -214,7 +214,7 @@ hal::Task<void> waiting_costs_nothing(RegisterRig& rig) {
   co_await rest(rig.loop(), "an idle client");
 }
 
-constexpr Promise<RegisterRig> kPromises[] = {
+constexpr Promise<RegisterRig> kRegisterPromises[] = {
     {"TablesAreReadAsTheyAre", tables_are_read_as_they_are},
     {"WhatIsWrittenIsReadBack", what_is_written_is_read_back},
     {"CoilsTakeAnyValue", coils_take_any_value},
@@ -231,7 +231,7 @@ constexpr Promise<RegisterRig> kPromises[] = {
 }  // namespace
 
 std::span<const Promise<RegisterRig>> register_promises() {
-  return kPromises;
+  return kRegisterPromises;
 }
 
 }  // namespace links_test

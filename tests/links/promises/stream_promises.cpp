@@ -221,7 +221,7 @@ hal::Task<void> a_dialogue_survives_a_cut_at_any_call(StreamRig& rig) {
   }
 }
 
-constexpr Promise<StreamRig> kPromises[] = {
+constexpr Promise<StreamRig> kStreamPromises[] = {
     {"BytesArriveWholeAndInOrder", arrive_whole_and_in_order},
     {"BytesGoBothWaysAtOnce", go_both_ways_at_once},
     {"EveryBytePassesAsItIs", every_byte_passes_as_it_is},
@@ -238,7 +238,7 @@ constexpr Promise<StreamRig> kPromises[] = {
 }  // namespace
 
 std::span<const Promise<StreamRig>> stream_promises() {
-  return kPromises;
+  return kStreamPromises;
 }
 
 }  // namespace links_test
