@@ -203,6 +203,7 @@ struct MissionConfig {
   std::uint64_t seed = 1;
   double margin_m = 30.0;  // From the obstacles to the boundary where the map has none.
   bool return_home = true;
+  std::string start = "by-hand";               // As a service: "by-hand" or "on-boot".
   std::map<std::string, std::string> regions;  // [regions] name = "robot" | "manual" | "skip"
   Phase1Config phase1;
   Phase2Config phase2;

@@ -54,7 +54,11 @@ SectionSpec mission_section() {
                       "toured and no others planned"),
            keys.number("margin_m", &C::margin_m, 0, 10'000, "m",
                        "From the obstacles to the boundary, where the map draws no boundary"),
-           keys.other("return_home", &C::return_home, "Drive back to the start at the end")},
+           keys.other("return_home", &C::return_home, "Drive back to the start at the end"),
+           keys.other("start", &C::start,
+                      "As a service: wait for a person's release, or begin by itself where it was "
+                      "shut down in order",
+                      {"by-hand", "on-boot"})},
           {},
           {}};
 }

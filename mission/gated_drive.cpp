@@ -59,6 +59,7 @@ hal::Task<void> GatedDrive::run() {
 hal::Task<void> GatedDrive::cycle() {
   for (hal::Time next = clock_.now();; next = std::max(next + kGatePeriod, clock_.now())) {
     co_await clock_.sleep_until(next);
+    if (config_.alive) config_.alive();
     const hal::Twist twist = decide(clock_.now());
     (void)co_await drive_.command(twist);  // A drive that does not obey shows in its status.
   }
@@ -173,6 +174,11 @@ hal::Task<void> GatedDrive::serve_releases() {
 }
 
 hal::Task<Answer> GatedDrive::start() {
+  if (config_.starts_held && supervisor_.latched == 0) {
+    begun_ = true;
+    tell("the robot stands until a person releases it: " + config_.how_to_release);
+    co_return Answer::not_enough;
+  }
   if (supervisor_.latched == 0) co_await prove();  // Else only after a person's release.
   begun_ = true;
   event_ = Event::start;

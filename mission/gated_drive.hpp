@@ -24,6 +24,10 @@ class GatedDrive final : public hal::Drive {
     std::function<std::optional<hal::SafetyInputs>()> safety;
     std::function<void(const std::string&)> tell;  // What happens, as it happens. May be empty.
     std::string how_to_release = "press the reset button";  // For the operator.
+    // start() does not begin, however the program came up: a person does, by a release.
+    bool starts_held = false;
+    // In every cycle: it goes on. Must not allocate. May be empty.
+    std::function<void()> alive;
   };
   // Clock and drive must outlive it.
   GatedDrive(Config config, hal::Clock& clock, hal::GuardedDrive& drive);

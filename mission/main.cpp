@@ -8,6 +8,7 @@
 #include <iostream>
 
 #include "mission/main_hardware.hpp"
+#include "mission/main_service.hpp"
 
 namespace {
 
@@ -22,6 +23,7 @@ struct Options {
   std::optional<std::uint64_t> seed;
   int threads = 0;
   bool quiet = false;
+  bool service = false;
 };
 
 int refuse(const std::vector<mission::ConfigError>& errors) {
@@ -60,29 +62,53 @@ void print_outcome(const mission::RunRecord& record, const std::filesystem::path
   fmt::print(stderr, "{:.1f} s of wall time\n", wall_s);  // Apart: stdout repeats exactly.
 }
 
+mission::Prepared prepare(const Options& options) {
+  return mission::prepare(options.mission,
+                          {.site_folder = options.site,
+                           .robot_file = {},
+                           .has_seed = options.seed.has_value(),
+                           .seed = options.seed.value_or(0)},
+                          mission::WorldUse::backend);
+}
+
+// Why this mission is nothing for a service; empty: it is.
+std::vector<mission::ConfigError> service_problems(const mission::Prepared& prepared) {
+  std::vector<mission::ConfigError> errors;
+  if (prepared.config.robot.backend != "hardware")
+    errors.push_back({prepared.config.robot_file.generic_string(), 0, 0,
+                      "a service runs real devices; write backend = \"hardware\""});
+  if (std::getenv("STATE_DIRECTORY") == nullptr)
+    errors.push_back({"--service", 0, 0,
+                      "needs a folder that outlasts it in $STATE_DIRECTORY; write "
+                      "StateDirectory=vantage in its unit"});
+  return errors;
+}
+
 int run(const Options& options) {
   const auto began = std::chrono::steady_clock::now();
-  mission::Prepared prepared = mission::prepare(options.mission,
-                                                {.site_folder = options.site,
-                                                 .robot_file = {},
-                                                 .has_seed = options.seed.has_value(),
-                                                 .seed = options.seed.value_or(0)},
-                                                mission::WorldUse::backend);
+  mission::Prepared prepared = prepare(options);
+  if (prepared.errors.empty() && options.service) prepared.errors = service_problems(prepared);
   if (!prepared.errors.empty()) return refuse(prepared.errors);
+  std::optional<mission::Service> service;
+  if (options.service) service.emplace(std::getenv("STATE_DIRECTORY"));
   for (const nav::Repair& repair : prepared.site.repairs)
     fmt::print(stderr, "repaired: {}: {}\n", repair.where, repair.what);
   for (const auto* notes : {&prepared.notes, &prepared.tasks.notes})
     for (const std::string& note : *notes) fmt::print(stderr, "note: {}\n", note);
-  const mission::RunOptions run_options{.out = options.out,
-                                        .judge_cells = options.judge_cells,
-                                        .threads = mission::threads_or_all(options.threads),
-                                        .progress = options.quiet ? nullptr : &std::cerr,
-                                        .terminal = isatty(STDERR_FILENO) != 0};
+  const mission::RunOptions run_options{
+      .out = service ? mission::next_run_folder(options.out) : options.out,
+      .judge_cells = options.judge_cells,
+      .threads = mission::threads_or_all(options.threads),
+      .progress = options.quiet ? nullptr : &std::cerr,
+      .terminal = isatty(STDERR_FILENO) != 0,
+      .service = service ? &*service : nullptr,
+      .prepare_again = [&] { return prepare(options); }};
   const bool hardware = prepared.config.robot.backend == "hardware";
   const mission::RunOutcome outcome = hardware ? mission::run_on_hardware(prepared, run_options)
                                                : mission::run_in_simulation(prepared, run_options);
   print_outcome(outcome.record, outcome.report,
                 std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count());
+  if (service) service->ended();
   if (outcome.failure.empty()) return kDone;
   fmt::print(stderr, "vantaged: {}\n", outcome.failure);
   return outcome.stopped ? kStopped : kFailed;
@@ -109,6 +135,10 @@ int main(int argc, char** argv) {
   app.add_option("--judge-cells", options.judge_cells,
                  "Simulation: write the scanner positions that coverage was judged from (CSV)");
   app.add_flag("--quiet", options.quiet, "No progress on the terminal");
+  app.add_flag("--service", options.service,
+               "As a service of systemd (see vantage.service): tells it how far it is, and waits "
+               "for a person's release unless the mission says start = \"on-boot\" and the last "
+               "run ended in order; --out holds a numbered folder for each run");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -12,6 +12,7 @@
 
 #include "drivers/real_clock.hpp"
 #include "hal/together.hpp"
+#include "mission/main_serving.hpp"
 #include "mission/main_worker.hpp"
 
 namespace mission {
@@ -58,11 +59,12 @@ void note_run(RunRecord& record, const Prepared& prepared, const DeviceWatch& wa
 // the program and its group.
 class Signals {
  public:
-  Signals(asio::io_context& io, GuardedSurvey& survey)
+  Signals(asio::io_context& io, GuardedSurvey& survey, Service* service)
       : set_(io, SIGINT, SIGTERM), release_(io, SIGUSR1), meant_once_(io), gate_(survey.gate()) {
     wait_for_release();
-    set_.async_wait([this, &survey](boost::system::error_code error, int number) {
+    set_.async_wait([this, &survey, service](boost::system::error_code error, int number) {
       if (error) return;
+      if (service != nullptr) service->stopping();
       release_.cancel();
       survey.stop(fmt::format("stopped by {}", number == SIGINT ? "SIGINT" : "SIGTERM"));
       meant_once_.expires_after(kMeantOnce);
@@ -118,6 +120,9 @@ GatedDrive::Config GuardedSurvey::gated(const RobotConfig& robot) {
   GatedDrive::Config config = gate_config(robot, parts_.drivers);
   config.tell = [this](const std::string& what) { watch_.note(what); };
   config.how_to_release = config_.how_to_release;
+  config.boot = config_.boot;
+  config.starts_held = config_.starts_held;
+  config.alive = config_.gate_is_alive;
   return config;
 }
 
@@ -202,7 +207,11 @@ RunOutcome run_on_hardware(Prepared& prepared, const RunOptions& options) {
   RunStore store = RunStore::open(options.out).value();
   std::ostream none(nullptr);
   std::ostream& out = options.progress ? *options.progress : none;
-  ProgressPrinter progress(out, options.progress && options.terminal);
+  const std::unique_ptr<ProgressPrinter> printer =
+      options.service != nullptr
+          ? std::make_unique<ServiceProgress>(*options.service)
+          : std::make_unique<ProgressPrinter>(out, options.progress && options.terminal);
+  ProgressPrinter& progress = *printer;
   asio::io_context io{1};
   drivers::RealClock clock;
   const RobotConfig& robot = prepared.config.robot;
@@ -210,18 +219,25 @@ RunOutcome run_on_hardware(Prepared& prepared, const RunOptions& options) {
   const drivers::GeoAnchor anchor{prepared.origin->lat_deg, prepared.origin->lon_deg,
                                   prepared.origin->h_m, 0};
   RobotDrivers drivers(robot, anchor, clock, links.ends());
-  Worker worker;
+  std::optional<Serving> serving;
+  if (options.service != nullptr)
+    serving.emplace(*options.service, prepared, options.prepare_again, io);
+  Worker worker(serving ? serving->worker() : Worker::Config{});
   GuardedSurvey::Config config;
+  if (serving) serving->configure(config);
   config.watch.link_troubles = [&links](std::string_view role) { return links.troubles(role); };
   config.how_to_release =
-      fmt::format("{}run `kill -USR1 {}`",
-                  robot.power.board_link.empty() ? "" : "press its reset button or ", getpid());
+      fmt::format("{}run `{}`", robot.power.board_link.empty() ? "" : "press its reset button or ",
+                  serving ? "systemctl kill --kill-whom=main -s USR1 vantage"
+                          : fmt::format("kill -USR1 {}", getpid()));
   config.watch.tell = [&progress](const std::string& what) { progress.message(what); };
   GuardedSurvey guarded(prepared, options.threads, config,
                         {io, clock, drivers, store, progress, worker});
-  const Signals signals(io, guarded);
+  const Signals signals(io, guarded, options.service);
   guarded.start();
+  if (serving) serving->begin();
   while (!guarded.ended()) io.run_one();
+  if (serving) serving->end();
   progress.finish();
   RunRecord& record = guarded.survey().record();
   note_run(record, prepared, guarded.watch());

@@ -21,6 +21,9 @@ class GuardedSurvey {
     hal::Duration start_patience = std::chrono::seconds(60);  // For all devices to start.
     DeviceWatch::Config watch;
     std::string how_to_release = "press the reset button";
+    Boot boot = Boot::clean;
+    bool starts_held = false;             // See GatedDrive::Config.
+    std::function<void()> gate_is_alive;  // The same.
   };
   struct Parts {
     boost::asio::io_context& io;

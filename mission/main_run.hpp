@@ -39,13 +39,17 @@ struct Prepared {
 Prepared prepare(const std::filesystem::path& mission_file, const Overrides& overrides,
                  WorldUse use, const std::filesystem::path& model_file = {});
 
+class Service;
+
 struct RunOptions {
   std::filesystem::path out;          // Folder for the run's products.
   std::filesystem::path judge_cells;  // See SimBackend::judge.
   int threads = 1;
-  std::ostream* progress = nullptr;             // Null: says nothing.
-  bool terminal = false;                        // Whether `progress` is one.
-  std::function<void(SimBackend&)> watch = {};  // Called as time goes on, to break something.
+  std::ostream* progress = nullptr;              // Null: says nothing.
+  bool terminal = false;                         // Whether `progress` is one.
+  std::function<void(SimBackend&)> watch = {};   // Called as time goes on, to break something.
+  Service* service = nullptr;                    // Hardware: what it is run by; null: by a person.
+  std::function<Prepared()> prepare_again = {};  // With a service: for its reload.
 };
 
 struct RunOutcome {

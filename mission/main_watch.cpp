@@ -62,6 +62,10 @@ void DeviceWatch::look() {
   note("the robot stands, because it misses " + what_is_missing());
 }
 
+void DeviceWatch::step(MissionStep step) const {
+  if (config_.step) config_.step(step);
+}
+
 hal::Task<void> DeviceWatch::until_well() {
   while (!well_) co_await back_.wait();
 }
@@ -102,6 +106,7 @@ std::string DeviceWatch::what_is_missing() const {
 }
 
 hal::Task<hal::Result<void>> WatchedDrive::command(hal::Twist twist) {
+  watch_.step(MissionStep::goes_on);
   watch_.look();
   if (watch_.well()) {
     auto done = co_await drive_.command(twist);
@@ -114,8 +119,10 @@ hal::Task<hal::Result<void>> WatchedDrive::command(hal::Twist twist) {
     const hal::Twist stand;
     (void)co_await drive_.command(stand);  // Gone or not.
   }
+  watch_.step(MissionStep::waits);
   co_await watch_.until_well();
   co_await drive_.until_released();
+  watch_.step(MissionStep::goes_on);
   co_return hal::Result<void>{};
 }
 
@@ -135,8 +142,11 @@ hal::Task<hal::Result<hal::GnssFix>> WatchedGnss::next_fix() {
 }
 
 hal::Task<hal::Result<hal::ScanCloud>> WatchedScanner::scan() {
+  watch_.step(MissionStep::waits);
   co_await watch_.until_well();
+  watch_.step(MissionStep::scans);
   auto cloud = co_await drivers_.scanner().scan();
+  watch_.step(MissionStep::goes_on);
   if (cloud) co_return cloud;
   const std::string& problem = drivers_.scan_problem();
   watch_.note("scan failed: " + (problem.empty() ? cloud.error().message() : problem));

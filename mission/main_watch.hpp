@@ -13,6 +13,13 @@
 
 namespace mission {
 
+// What a mission is heard to do: until the next one it may be silent for as long as that takes.
+enum class MissionStep {
+  goes_on,  // It commanded the drive, or has a scan.
+  scans,
+  waits,  // For a device, which is bounded, or for a person, who may never come.
+};
+
 class DeviceWatch {
  public:
   struct Config {
@@ -21,6 +28,7 @@ class DeviceWatch {
     std::function<std::vector<drivers::Trouble>(std::string_view role)> link_troubles;
     std::function<void(const std::string&)> tell;  // What happens, as it happens.
     std::function<bool()> held;  // A person holds the robot: patience begins when they let it go.
+    std::function<void(MissionStep)> step;  // What the mission does with its devices. May be empty.
   };
   // The drivers and the clock must outlive it.
   DeviceWatch(Config config, const RobotDrivers& drivers, hal::Clock& clock);
@@ -34,6 +42,7 @@ class DeviceWatch {
   bool well() const { return well_; }
   hal::Task<void> until_well();
   void look();
+  void step(MissionStep step) const;
 
   // "imu (vn100 at serial:/dev/ttyUSB1@115200): ...; do: ...", one after the other.
   std::string what_is_missing() const;

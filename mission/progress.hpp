@@ -42,10 +42,10 @@ class ProgressPrinter {
   ProgressPrinter(std::ostream& out, bool is_terminal) : out_(out), is_terminal_(is_terminal) {}
   ProgressPrinter(const ProgressPrinter&) = delete;
   ProgressPrinter& operator=(const ProgressPrinter&) = delete;
-  ~ProgressPrinter() { finish(); }
+  virtual ~ProgressPrinter() { finish(); }
 
-  void show(const Progress& progress);
-  void message(std::string_view text);
+  virtual void show(const Progress& progress);
+  virtual void message(std::string_view text);
   // Leaves the last line standing. Called again: nothing.
   void finish();
 

@@ -1,14 +1,19 @@
 // vantage doctor: which devices of a robot are there, who they are, and what is wrong with them.
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/json/array.hpp>
+#include <boost/json/object.hpp>
 #include <exception>
+#include <filesystem>
+#include <fstream>
 #include <memory>
 
 #include "drivers/real_clock.hpp"
 #include "mission/main_links.hpp"
+#include "mission/main_realtime.hpp"
 #include "tools/vantage_command.hpp"
 
 namespace vantage {
@@ -95,6 +100,42 @@ boost::json::object device_json(const mission::NamedDevice& named,
           {"troubles", std::move(troubles)}};
 }
 
+// Who uses how much memory: the doctor before and after it opened the devices, and every vantaged
+// that runs here.
+class Memory {
+ public:
+  Memory() { add("doctor at the start", getpid()); }
+  void look() {
+    add("doctor with all devices open", getpid());
+    std::error_code none;
+    for (const auto& entry : std::filesystem::directory_iterator("/proc", none)) {
+      std::string name;
+      std::getline(std::ifstream(entry.path() / "comm"), name);
+      if (name != "vantaged") continue;
+      const std::string id = entry.path().filename().string();
+      add("vantaged " + id, std::stoi(id));
+    }
+  }
+  void print() const {
+    for (const auto& [who, use] : uses_) fmt::print("memory   {}: {}\n", who, text_of(use));
+  }
+  boost::json::array json() const {
+    boost::json::array all;
+    for (const auto& [who, use] : uses_)
+      all.push_back(boost::json::object{{"who", who},
+                                        {"resident_kb", use.resident_kb},
+                                        {"peak_kb", use.peak_kb},
+                                        {"locked_kb", use.locked_kb}});
+    return all;
+  }
+
+ private:
+  void add(const std::string& who, pid_t process) {
+    if (const auto use = mission::memory_use(process)) uses_.emplace_back(who, *use);
+  }
+  std::vector<std::pair<std::string, mission::MemoryUse>> uses_;
+};
+
 // Until all devices are healthy, or time is up.
 hal::Task<void> look(const mission::RobotDrivers& drivers, const mission::HardwareLinks& links,
                      hal::Clock& clock, double wait_s) {
@@ -113,6 +154,7 @@ int diagnose(const DoctorOptions& options) {
   drivers::RealClock clock;
   std::exception_ptr failure;
   int sick = 0;
+  Memory memory;
   {
     mission::HardwareLinks links(config.robot, io.get_executor(), clock);
     mission::RobotDrivers drivers(config.robot, std::nullopt, clock, links.ends());
@@ -124,6 +166,7 @@ int diagnose(const DoctorOptions& options) {
     boost::asio::co_spawn(io, look(drivers, links, clock, options.wait_s), on_end);
     io.run();
     if (failure) std::rethrow_exception(failure);
+    memory.look();
     boost::json::array devices;
     for (const mission::NamedDevice& named : drivers.devices()) {
       sick += !healthy(named, links);
@@ -133,11 +176,13 @@ int diagnose(const DoctorOptions& options) {
         print_device(named, links);
     }
     if (options.json)
-      print_json(boost::json::object{{"ok", sick == 0}, {"devices", std::move(devices)}});
+      print_json(boost::json::object{
+          {"ok", sick == 0}, {"devices", std::move(devices)}, {"memory", memory.json()}});
     else
       fmt::print("{}\n", sick == 0
                              ? "all healthy"
                              : fmt::format("{} of {} not healthy", sick, drivers.devices().size()));
+    if (!options.json) memory.print();
   }
   return sick == 0 ? kFine : kFailed;
 }

@@ -92,6 +92,7 @@ seed = 9223372036854775807
 plan = "p.toml"
 margin_m = 12
 return_home = false
+start = "on-boot"
 [regions]
 moat = "manual"
 "inner court" = "robot"
@@ -215,6 +216,7 @@ seed=9223372036854775807
 plan=p.toml
 margin_m=12
 return_home=false
+start=on-boot
 phase1.cover=greedy
 phase1.candidates=7
 phase1.coverage_goal=0.5

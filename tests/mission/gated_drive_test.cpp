@@ -9,6 +9,7 @@
 
 #include "drivers/agilex_drive.hpp"
 #include "drivers/cia402_drive.hpp"
+#include "drivers/real_clock.hpp"
 #include "sim/agilex_unit.hpp"
 #include "sim/cia402_unit.hpp"
 #include "tests/drivers/allocations.hpp"
@@ -51,12 +52,16 @@ struct GatedBase : testing::Test, DriveBench {
   std::vector<boost::system::error_code> told_mission;
   hal::Time planned_at{};
   bool plans = true;
+  bool held = false;  // From the start.
+  int heard = 0;      // Of the gate, how often.
 
   void make(mission::Boot boot = mission::Boot::clean) {
     GatedDrive::Config config;
     config.boot = boot;
     config.safety = [this] { return safety; };
     config.tell = [this](const std::string& what) { told.push_back(what); };
+    config.starts_held = held;
+    config.alive = [this] { ++heard; };
     gate = std::make_unique<GatedDrive>(config, clock, drive);
     spawn(unit.run());
     spawn(drive.run());
@@ -260,6 +265,37 @@ TEST_F(GatedBase, WaitsForAPersonAfterAPowerCut) {
   EXPECT_EQ(world.driven_m(), 0);
   release();
   EXPECT_TRUE(gate->released());
+}
+
+TEST_F(GatedBase, DoesNotBeginByItselfWhenItStartsHeld) {
+  held = true;
+  make();
+  EXPECT_EQ(start(), Answer::not_enough);
+  EXPECT_THAT(told, Contains(HasSubstr("until a person releases it: press the reset button")));
+  twist = {0.4, 0};
+  spawn(plan());
+  wait(5s);
+  EXPECT_EQ(gate->mode(), Mode::holding);
+  EXPECT_EQ(world.driven_m(), 0) << "not even to prove anything";
+  release();
+  EXPECT_TRUE(gate->released());
+  wait(2s);
+  EXPECT_GT(world.driven_m(), 0.4);
+}
+
+TEST_F(GatedBase, IsStoppedRatherThanHeldAfterACrash) {
+  held = true;
+  make(mission::Boot::crash);
+  EXPECT_EQ(start(), Answer::not_enough);
+  EXPECT_EQ(gate->stopped_by(), FaultCode::program_fault);
+  EXPECT_EQ(gate->mode(), Mode::stopped);
+}
+
+TEST_F(GatedBase, IsHeardInEveryCycle) {
+  make();
+  const int before = heard;
+  wait(1s);
+  EXPECT_NEAR(heard - before, 100, 1);
 }
 
 // --- The drive's own time-out.
@@ -486,6 +522,30 @@ TEST(GatedDriveLoop, AllocatesNoMoreThanTheSleepsOfItsClock) {
   const std::uint64_t by_sleeps = allocated_by(sleeps);
   EXPECT_GE(by_sleeps, 100U) << "the simulated clock keeps a list of sleepers";
   EXPECT_LE(allocated_by(gates), by_sleeps);
+}
+
+// What wakes it on a robot allocates nothing either.
+TEST(GatedDriveLoop, AllocatesNothingInRealTime) {
+  boost::asio::io_context io{1};
+  drivers::RealClock clock;
+  QuietDrive drive(clock);
+  GatedDrive::Config config;
+  int cycles = 0;
+  std::uint64_t before = 0, after = 0;
+  config.alive = [&] {
+    if (++cycles == 20) before = allocations();
+    if (cycles < 40) return;
+    after = allocations();
+    io.stop();
+  };
+  GatedDrive gate(config, clock, drive);
+  boost::asio::co_spawn(io, gate.run(), [](std::exception_ptr problem) {
+    if (problem) std::rethrow_exception(problem);
+  });
+  io.run();
+  EXPECT_EQ(cycles, 40);
+  EXPECT_GT(before, 0U) << "it counts nothing";
+  EXPECT_EQ(after - before, 0U);
 }
 
 }  // namespace

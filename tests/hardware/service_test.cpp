@@ -1,0 +1,217 @@
+// `vantaged --service` as its service manager sees it. None of its devices is there: it waits.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <signal.h>
+#include <sys/ptrace.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <thread>
+
+#include "mission/main_service.hpp"
+#include "tests/tools/vantage_test.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+using testing::Not;
+
+const fs::path kYard = VANTAGE_SOURCE_DIR "/tests/yard";
+constexpr const char* kWatchdogUs = "800000";
+
+class Service : public test::VantageTest {
+ protected:
+  void SetUp() override {
+    VantageTest::SetUp();
+    for (const char* name : {"footprint.geojson", "mission.toml", "model.obj"})
+      write(std::string("yard/") + name, test::read_text(kYard / name));
+    robot(R"("hardware")");
+    fs::create_directories(state_);
+    listen();
+  }
+  void TearDown() override {
+    if (pid_ > 0) {
+      kill(pid_, SIGKILL);
+      waitpid(pid_, nullptr, __WALL);
+    }
+    close(notified_);
+  }
+
+  void robot(const std::string& backend) {
+    std::string text = test::read_text(kYard / "robot.toml");
+    text.replace(text.find("\"sim\""), 5, backend);
+    write("yard/robot.toml", text + "[drive]\nlink = \"can:vantage9\"\n");
+  }
+  void listen() {
+    notified_ = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    const std::string path = notify_path();
+    std::copy(path.begin(), path.end(), address.sun_path);
+    ASSERT_EQ(bind(notified_, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+  }
+  std::string notify_path() const { return (folder_.path() / "notify").string(); }
+
+  // As systemd starts it.
+  void start(bool watched = true) {
+    const std::string program = std::string(VANTAGE_BINARY_DIR) + "/vantaged";
+    const std::string mission = (folder_.path() / "yard/mission.toml").string();
+    const std::string out = (state_ / "runs").string(), err = (folder_.path() / "err").string();
+    pid_ = fork();
+    ASSERT_GE(pid_, 0);
+    if (pid_ > 0) return;
+    setenv("NOTIFY_SOCKET", notify_path().c_str(), 1);
+    setenv("STATE_DIRECTORY", state_.c_str(), 1);
+    if (watched) setenv("WATCHDOG_USEC", kWatchdogUs, 1);
+    const int file = open(err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
+    dup2(file, STDOUT_FILENO);
+    dup2(file, STDERR_FILENO);
+    execl(program.c_str(), "vantaged", "--service", "--quiet", "--out", out.c_str(),
+          mission.c_str(), nullptr);
+    _exit(127);
+  }
+
+  // The next message; empty: none for so long.
+  std::string next(std::chrono::milliseconds patience) const {
+    timeval wait{patience.count() / 1000, patience.count() % 1000 * 1000};
+    setsockopt(notified_, SOL_SOCKET, SO_RCVTIMEO, &wait, sizeof wait);
+    std::array<char, 8192> buffer{};
+    const ssize_t size = recv(notified_, buffer.data(), buffer.size(), 0);
+    return size > 0 ? std::string(buffer.data(), static_cast<std::size_t>(size)) : "";
+  }
+  // Whether such a message comes within half a minute.
+  bool hears(const std::string& part) const {
+    const auto late = std::chrono::steady_clock::now() + 30s;
+    while (std::chrono::steady_clock::now() < late)
+      if (next(1s).find(part) != std::string::npos) return true;
+    return false;
+  }
+  int fed_within(std::chrono::milliseconds span) const {
+    const auto end = std::chrono::steady_clock::now() + span;
+    int fed = 0;
+    while (std::chrono::steady_clock::now() < end) fed += next(20ms) == "WATCHDOG=1";
+    return fed;
+  }
+  void forget() const {
+    while (!next(1ms).empty()) {
+    }
+  }
+
+  int exit_code() {
+    int status = 0;
+    waitpid(std::exchange(pid_, 0), &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+  std::string last_run() const { return test::read_text(state_ / "last_run"); }
+  std::string said() const { return test::read_text(folder_.path() / "err"); }
+
+  const fs::path state_ = folder_.path() / "state";
+  int notified_ = -1;
+  pid_t pid_ = 0;
+};
+
+TEST_F(Service, IsReadyWhenItLooksForDevicesAndSaysWhatItWaitsFor) {
+  start();
+  EXPECT_TRUE(hears("READY=1"));
+  EXPECT_TRUE(hears("STATUS=waits for drive (agilex-scout2 at can:vantage9): not there"));
+  EXPECT_GE(fed_within(2s), 4);
+  EXPECT_THAT(last_run(), HasSubstr("running "));
+
+  kill(pid_, SIGTERM);
+  EXPECT_TRUE(hears("STOPPING=1"));
+  EXPECT_EQ(exit_code(), 3) << said();
+  EXPECT_THAT(last_run(), HasSubstr("ended "));
+  EXPECT_TRUE(fs::exists(state_ / "runs/0001/report.html"));
+  EXPECT_THAT(said(), HasSubstr("memory at the start: "));
+  EXPECT_THAT(said(), HasSubstr("memory at the end: "));
+}
+
+TEST_F(Service, KeepsEachRun) {
+  for (int run = 0; run < 2; ++run) {
+    start(false);
+    ASSERT_TRUE(hears("READY=1")) << said();
+    kill(pid_, SIGTERM);
+    EXPECT_EQ(exit_code(), 3);
+  }
+  EXPECT_TRUE(fs::exists(state_ / "runs/0001/report.html"));
+  EXPECT_TRUE(fs::exists(state_ / "runs/0002/report.html"));
+}
+
+TEST_F(Service, IsStoppedUntilAPersonReleasesItAfterACrashAndNotAfterAnOrderlyEnd) {
+  write("state/last_run", "ended anything\n");
+  start();
+  ASSERT_TRUE(hears("READY=1"));
+  EXPECT_TRUE(hears("STATUS=waits for"));
+  EXPECT_THAT(said(), Not(HasSubstr("the robot is stopped")));
+  kill(pid_, SIGSEGV);
+  EXPECT_EQ(exit_code(), -1);
+  start();
+  EXPECT_TRUE(hears("STATUS=the robot is stopped: F800-program-fault"));
+}
+
+TEST_F(Service, TakesWhatSystemdSaysOfTheLastEnd) {
+  start();
+  ASSERT_TRUE(hears("READY=1"));
+  kill(pid_, SIGKILL);
+  exit_code();
+  write("state/stopped_with", "watchdog ABRT\n");
+  start();
+  EXPECT_TRUE(hears("STATUS=the robot is stopped: F801-watchdog-restart"));
+  EXPECT_FALSE(fs::exists(state_ / "stopped_with"));
+}
+
+// One thread alone stands still: as if the event loop hung.
+TEST_F(Service, IsNotFedWhenItsEventLoopHangsWhichItNames) {
+  start();
+  ASSERT_TRUE(hears("READY=1"));
+  ASSERT_TRUE(hears("WATCHDOG=1"));
+  ASSERT_EQ(ptrace(PTRACE_SEIZE, pid_, nullptr, nullptr), 0) << "not permitted here?";
+  ASSERT_EQ(ptrace(PTRACE_INTERRUPT, pid_, nullptr, nullptr), 0);
+  EXPECT_TRUE(hears("STATUS=hangs: the "));
+  forget();
+  EXPECT_EQ(fed_within(1500ms), 0);
+  EXPECT_THAT(said(), testing::AnyOf(HasSubstr("hangs: the event loop was due"),
+                                     HasSubstr("hangs: the gate cycle was due")));
+  EXPECT_THAT(said(), HasSubstr("F801-watchdog-restart"));
+  EXPECT_THAT(last_run(), HasSubstr("hung "));
+  kill(pid_, SIGKILL);
+  waitpid(pid_, nullptr, __WALL);
+  start();
+  EXPECT_TRUE(hears("STATUS=the robot is stopped: F801-watchdog-restart"));
+}
+
+TEST_F(Service, CheckConfigOnReloadAndSaysWhatTheNextStartWouldChange) {
+  start();
+  ASSERT_TRUE(hears("READY=1"));
+  kill(pid_, SIGHUP);
+  EXPECT_TRUE(hears("RELOADING=1"));
+  EXPECT_TRUE(hears("STATUS=config: in order; no value changes"));
+  EXPECT_TRUE(hears("READY=1"));
+
+  std::string mission = test::read_text(kYard / "mission.toml");
+  write("yard/mission.toml", "seed = 7\n" + mission);
+  kill(pid_, SIGHUP);
+  EXPECT_TRUE(hears("STATUS=at the next start: seed: 7 instead of 1"));
+
+  write("yard/mission.toml", "sede = 7\n" + mission);
+  kill(pid_, SIGHUP);
+  EXPECT_TRUE(hears("unknown key 'sede'"));
+  EXPECT_TRUE(hears("would not start again"));
+  EXPECT_GE(fed_within(1s), 2) << "it goes on";
+}
+
+TEST_F(Service, IsRefusedWithASimulatedRobotAndLeavesNothing) {
+  robot(R"("sim")");
+  start();
+  EXPECT_EQ(exit_code(), 2);
+  EXPECT_THAT(said(), HasSubstr("a service runs real devices; write backend = \"hardware\""));
+  EXPECT_TRUE(fs::is_empty(state_));
+}
+
+}  // namespace
