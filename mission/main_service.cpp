@@ -24,6 +24,7 @@ namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 
 constexpr std::size_t kSmallFile = 4096;
+constexpr std::size_t kStatusColumns = 200;  // The journal has the whole line.
 
 std::string variable(const char* name) {
   const char* value = std::getenv(name);
@@ -101,7 +102,7 @@ void Service::ready() {
 }
 
 void Service::status(std::string_view line) {
-  (void)sd_notify(0, fmt::format("STATUS={}", line).c_str());
+  (void)sd_notify(0, fmt::format("STATUS={}", shortened(line, kStatusColumns)).c_str());
 }
 
 void Service::reloading() {

@@ -22,7 +22,7 @@ using namespace std::chrono_literals;
 using testing::HasSubstr;
 using testing::Not;
 
-const fs::path kYard = VANTAGE_SOURCE_DIR "/tests/yard";
+const fs::path kServedYard = VANTAGE_SOURCE_DIR "/tests/yard";
 constexpr const char* kWatchdogUs = "800000";
 
 class Service : public test::VantageTest {
@@ -30,7 +30,7 @@ class Service : public test::VantageTest {
   void SetUp() override {
     VantageTest::SetUp();
     for (const char* name : {"footprint.geojson", "mission.toml", "model.obj"})
-      write(std::string("yard/") + name, test::read_text(kYard / name));
+      write(std::string("yard/") + name, test::read_text(kServedYard / name));
     robot(R"("hardware")");
     fs::create_directories(state_);
     listen();
@@ -44,7 +44,7 @@ class Service : public test::VantageTest {
   }
 
   void robot(const std::string& backend) {
-    std::string text = test::read_text(kYard / "robot.toml");
+    std::string text = test::read_text(kServedYard / "robot.toml");
     text.replace(text.find("\"sim\""), 5, backend);
     write("yard/robot.toml", text + "[drive]\nlink = \"can:vantage9\"\n");
   }
@@ -194,7 +194,7 @@ TEST_F(Service, CheckConfigOnReloadAndSaysWhatTheNextStartWouldChange) {
   EXPECT_TRUE(hears("STATUS=config: in order; no value changes"));
   EXPECT_TRUE(hears("READY=1"));
 
-  std::string mission = test::read_text(kYard / "mission.toml");
+  std::string mission = test::read_text(kServedYard / "mission.toml");
   write("yard/mission.toml", "seed = 7\n" + mission);
   kill(pid_, SIGHUP);
   EXPECT_TRUE(hears("STATUS=at the next start: seed: 7 instead of 1"));
