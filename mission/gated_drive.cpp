@@ -72,10 +72,15 @@ hal::Twist GatedDrive::decide(hal::Time now) {
   if (decision.mode != mode_ || decision.answer != Answer::none) on_decision(decision, conditions_);
   GateInputs inputs;
   inputs.mode = mode_;
+  inputs.range_at = is_.range_at.value_or(now);  // What is not at work is not late.
+  if (mode_ != Mode::teleop) inputs.zone_speed_max_mps = is_.zone_speed_max_mps;
   inputs.planned = planned_;
   inputs.planned_at = planned_at_;
   inputs.feedback_at = status_.reported_at;
-  return gate(config_.gate, gate_, inputs, now).twist;
+  const GateCommand command = gate(config_.gate, gate_, inputs, now);
+  const GateReason before = std::exchange(reason_, command.reason);
+  if (reason_ == GateReason::zone && before != GateReason::zone) tell("the robot holds: " + why());
+  return command.twist;
 }
 
 // Before the beginning the drive may well be silent or held; a pressed e-stop counts at any time.
@@ -85,6 +90,7 @@ Conditions GatedDrive::look(hal::Time now) {
   const bool silent = begun_ && silent_cycles_ == kSilentCycles;
   if (silent) proven_ = false;  // It may be another one when it is back.
   const auto safety = config_.safety ? config_.safety() : std::nullopt;
+  is_ = around_ ? around_() : Surroundings{};
   Conditions is;
   is.set(Condition::estop, status_.estop_pressed || (safety && safety->estop_pressed));
   is.set(Condition::bumper, safety && safety->bumper_pressed);
@@ -92,7 +98,10 @@ Conditions GatedDrive::look(hal::Time now) {
   is.set(Condition::drive_held, status_.remote_control || (begun_ && status_.held));
   is.set(Condition::fault, status_.commanded_by_others);
   is.set(Condition::operator_alive, operator_alive(config_.gate, gate_, now));
-  is.set(Condition::mission_loaded);
+  is.set(Condition::pose_uncertain, is_.pose_uncertain);
+  is.set(Condition::range_stale, is_.range_at && now - *is_.range_at > config_.gate.range_max);
+  is.set(Condition::battery_reserve, is_.battery_reserve);
+  is.set(Condition::mission_loaded, loaded_);
   is.set(Condition::proven, proven_);
   const bool reset = safety && safety->reset_pressed;
   if (reset && !std::exchange(reset_was_, reset)) ask_release();
@@ -113,7 +122,11 @@ FaultCode GatedDrive::cause_of(Conditions conditions) const {
 
 void GatedDrive::on_decision(const Decision& decision, Conditions conditions) {
   const bool stops = decision.mode == Mode::stopped && mode_ != Mode::stopped;
+  const bool was_holding = mode_ == Mode::holding;
   mode_ = decision.mode;
+  // The range source has to begin anew for every way: that is not worth a word.
+  if (const auto by = held_by(); by && by != FaultCode::range_stale && !was_holding)
+    tell("the robot holds: " + why());
   if (stops) {
     stopped_by_ = cause_of(conditions);
     tell("the robot is stopped: " + why());
@@ -121,7 +134,11 @@ void GatedDrive::on_decision(const Decision& decision, Conditions conditions) {
   if (decision.answer == Answer::none) return;
   answer_ = decision.answer;
   if (answer_ == Answer::released) {
-    if (stopped_by_) tell("the robot was released after " + std::string(entry_of(*stopped_by_).id));
+    if (stopped_by_)
+      tell("the robot was released after " + std::string(entry_of(*stopped_by_).id));
+    else if (held_)
+      tell("the robot is released");
+    held_ = false;
     stopped_by_.reset();
     released_.notify();
   } else if (begun_ && answer_ != Answer::not_enough) {
@@ -129,7 +146,20 @@ void GatedDrive::on_decision(const Decision& decision, Conditions conditions) {
   }
 }
 
+std::optional<FaultCode> GatedDrive::held_by() const {
+  if (mode_ != Mode::holding || !supervisor_.released) return std::nullopt;
+  return conditions_.has(Condition::pose_uncertain) ? FaultCode::pose_uncertain
+                                                    : FaultCode::range_stale;
+}
+
 std::string GatedDrive::why() const {
+  if (const auto by = held_by()) {
+    const FaultEntry& fault = entry_of(*by);
+    return fmt::format("{}: {}; do: {}", fault.id, fault.cause, fault.remedy);
+  }
+  if (reason_ == GateReason::zone)
+    return std::string(name(reason_)) +
+           ": it believes that it is outside of where it can drive; do: drive it back by hand";
   if (!stopped_by_) return {};
   const FaultEntry& fault = entry_of(*stopped_by_);
   return fmt::format("{}: {}; do: {}; to release it, {}", fault.id, fault.cause, fault.remedy,
@@ -148,11 +178,20 @@ void GatedDrive::ask_release() {
 }
 
 void GatedDrive::ask_hold() {
+  ++holds_;
+  held_ = true;
+  release_asked_ = false;
   event_ = Event::hold;
+  stopped_.notify();
+}
+
+void GatedDrive::hear(const OperatorPacket& packet) {
+  mission::hear(gate_, packet, clock_.now());
+  planned_at_ = {};  // When they let go, the robot stands until the mission has looked again.
 }
 
 void GatedDrive::finish() {
-  begun_ = false;
+  begun_ = loaded_ = false;
   ask_hold();
 }
 
@@ -165,9 +204,11 @@ bool GatedDrive::held_by_people() const {
 hal::Task<void> GatedDrive::serve_releases() {
   for (;;) {
     while (!release_asked_) co_await asked_.wait();
+    const std::uint64_t holds = holds_;
     const bool stop_is_there = (conditions_.bits() & latch::kStops) != 0;
     if (!stop_is_there && begun_ && !proven_) co_await prove();
     release_asked_ = false;
+    if (holds != holds_) continue;  // They think otherwise now.
     if (!proof_failure_.empty()) tell("the drive's own time-out is not proven: " + proof_failure_);
     event_ = Event::release;
   }
@@ -181,16 +222,18 @@ hal::Task<Answer> GatedDrive::start() {
   }
   if (supervisor_.latched == 0) co_await prove();  // Else only after a person's release.
   begun_ = true;
-  event_ = Event::start;
   answer_ = Answer::none;
-  while (answer_ == Answer::none) co_await clock_.sleep_for(kGatePeriod);
+  while (answer_ == Answer::none) {
+    if (event_ == Event::none) event_ = Event::start;  // A hold goes before it.
+    co_await clock_.sleep_for(kGatePeriod);
+  }
   co_return answer_;
 }
 
 // Whatever stops the robot ends the proof, too, and at once.
 hal::Task<void> GatedDrive::prove() {
   proof_failure_ = refusal(errc::make_error_code(errc::operation_canceled));
-  const int first = co_await hal::first_of(try_to_prove(), until_stop());
+  const int first = co_await hal::first_of(try_to_prove(), until_stop(holds_));
   if (first == 0) co_return;
   const hal::Twist stand;
   (void)co_await drive_.command(stand);
@@ -202,8 +245,8 @@ hal::Task<void> GatedDrive::try_to_prove() {
   proof_failure_ = proven_ ? "" : refusal(took.error());
 }
 
-hal::Task<void> GatedDrive::until_stop() {
-  while ((conditions_.bits() & kEndsProof) == 0) co_await stopped_.wait();
+hal::Task<void> GatedDrive::until_stop(std::uint64_t holds) {
+  while ((conditions_.bits() & kEndsProof) == 0 && holds == holds_) co_await stopped_.wait();
 }
 
 hal::Task<void> GatedDrive::until_released() {
@@ -214,11 +257,14 @@ hal::Task<void> GatedDrive::until_released() {
 
 hal::Task<hal::Result<void>> GatedDrive::command(hal::Twist twist) {
   planned_ = twist;
-  planned_at_ = clock_.now();
-  const hal::Twist now = decide(planned_at_);
+  planned_at_ = mode_ == Mode::teleop ? hal::Time{} : clock_.now();
+  const hal::Twist now = decide(clock_.now());
   const auto told = co_await drive_.command(now);
   if (!told) co_return told;
-  if (!moves(mode_)) co_return errc::make_error_code(errc::operation_not_permitted);
+  if (held_by() == FaultCode::range_stale)
+    co_return errc::make_error_code(errc::resource_unavailable_try_again);
+  if (!moves(mode_) || mode_ == Mode::teleop)
+    co_return errc::make_error_code(errc::operation_not_permitted);
   co_return told;
 }
 

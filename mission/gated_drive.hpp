@@ -11,6 +11,7 @@
 #include "mission/faults.hpp"
 #include "mission/gate.hpp"
 #include "mission/supervisor.hpp"
+#include "mission/surroundings.hpp"
 
 namespace mission {
 
@@ -44,35 +45,49 @@ class GatedDrive final : public hal::Drive {
   // A person's release or stop, from wherever it comes. A release is carried out in run(), when the
   // drive's time-out has been proven; what became of it is told.
   void ask_release();
+  // A hold takes back every release that was asked for before it.
   void ask_hold();
+  // What an operator's console sends over and over while a dead-man key is held: takes over from
+  // the mission within one period, once the robot is released. Repeated and older packets count for
+  // nothing.
+  void hear(const OperatorPacket& packet);
+  // What the mission knows of where it is; called in every cycle; must not allocate, and must live
+  // as long as run() runs. Empty: nothing holds the robot there.
+  void watch_surroundings(std::function<Surroundings()> around) { around_ = std::move(around); }
   // The mission is over: stands, and what the drive does from now on stops nothing any more.
   void finish();
 
   // What the mission wants. Counts for GateConfig::planner_max unless repeated. Fails as the drive
-  // does, and with errc::operation_not_permitted while nobody may drive: see why().
+  // does, with errc::operation_not_permitted while the mission may not drive: see why(), and with
+  // errc::resource_unavailable_try_again while the robot stands only because the range source is
+  // silent.
   hal::Task<hal::Result<void>> command(hal::Twist twist) override;
   hal::Task<hal::Result<hal::WheelTravel>> next_travel() override;
 
   Mode mode() const { return mode_; }
   bool released() const { return supervisor_.released; }
+  bool begun() const { return begun_; }  // start() was called: releases count.
   // An e-stop, a bumper or a remote control holds it just now.
   bool held_by_people() const;
   // Until it is released, whatever for it was not.
   hal::Task<void> until_released();
   // Why it stands and what to do, in words for the operator; empty: it does not, or nobody stopped
-  // it.
+  // or held it.
   std::string why() const;
   // Why the drive's time-out is not proven; empty: it is, or nobody has tried.
   const std::string& proof() const { return proof_failure_; }
   // What stopped it, the gravest first seen; nothing: it is not stopped.
   std::optional<FaultCode> stopped_by() const { return stopped_by_; }
+  // What holds a released robot until it is over; nothing: nothing does.
+  std::optional<FaultCode> held_by() const;
+  GateReason gate_reason() const { return reason_; }
 
  private:
   hal::Task<void> cycle();
   hal::Task<void> serve_releases();
   hal::Task<void> prove();
   hal::Task<void> try_to_prove();
-  hal::Task<void> until_stop();
+  hal::Task<void> until_stop(std::uint64_t holds);
   hal::Twist decide(hal::Time now);
   Conditions look(hal::Time now);
   FaultCode cause_of(Conditions conditions) const;
@@ -85,6 +100,7 @@ class GatedDrive final : public hal::Drive {
 
   SupervisorState supervisor_;
   GateState gate_;
+  GateReason reason_ = GateReason::mode;  // Of the latest cycle.
   Mode mode_ = Mode::idle;
   bool begun_ = false;   // Silence and refusals of the drive count from now on.
   bool proven_ = false;  // Since the drive was last silent.
@@ -93,10 +109,13 @@ class GatedDrive final : public hal::Drive {
   Conditions conditions_;
   hal::DriveStatus status_;
   int silent_cycles_ = 0;  // In a row.
-  bool reset_was_ = false, release_asked_ = false;
+  bool reset_was_ = false, release_asked_ = false, loaded_ = true, held_ = false;
+  std::uint64_t holds_ = 0;  // That were asked for.
   hal::Wake asked_, stopped_, released_;
   std::optional<FaultCode> stopped_by_;
   std::string proof_failure_;
+  std::function<Surroundings()> around_;
+  Surroundings is_;
 
   hal::Twist planned_;
   hal::Time planned_at_{};

@@ -10,6 +10,7 @@ GatedDrive::Config gate_config(const RobotConfig& robot, const RobotDrivers& dri
   GatedDrive::Config config;
   config.gate.speed_max_mps = robot.body.speed_max_mps;
   config.gate.turn_max_radps = robot.body.turn_max_degps * std::numbers::pi / 180;
+  config.gate.has_range = robot.obstacles.device != "none";
   config.safety = [&drivers] { return drivers.safety_inputs(); };
   return config;
 }

@@ -122,6 +122,9 @@ hal::Task<hal::Result<void>> WatchedDrive::command(hal::Twist twist) {
   watch_.step(MissionStep::waits);
   co_await watch_.until_well();
   co_await drive_.until_released();
+  // Driven by a person, or held until it knows where it is.
+  while (drive_.mode() == Mode::teleop || drive_.held_by() == FaultCode::pose_uncertain)
+    co_await clock_.sleep_for(kTryAgain);
   watch_.step(MissionStep::goes_on);
   co_return hal::Result<void>{};
 }

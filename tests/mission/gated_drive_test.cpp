@@ -58,6 +58,7 @@ struct GatedBase : testing::Test, DriveBench {
   void make(mission::Boot boot = mission::Boot::clean) {
     GatedDrive::Config config;
     config.boot = boot;
+    config.gate.has_range = true;
     config.safety = [this] { return safety; };
     config.tell = [this](const std::string& what) { told.push_back(what); };
     config.starts_held = held;
@@ -296,6 +297,168 @@ TEST_F(GatedBase, IsHeardInEveryCycle) {
   const int before = heard;
   wait(1s);
   EXPECT_NEAR(heard - before, 100, 1);
+}
+
+TEST_F(GatedBase, IsNotReleasedByWhatWasAskedBeforeAPersonsHold) {
+  drive_off();
+  faults.set(sim::parse_unit_fault("off").setting);
+  wait(2s);
+  faults.clear();
+  wait(3s);
+  gate->ask_release();  // The time-out is proven anew first.
+  wait(300ms);
+  gate->ask_hold();
+  wait(5s);
+  EXPECT_FALSE(gate->released());
+  EXPECT_NEAR(world.rolling().forward_mps, 0, 0.01);
+  release();
+  EXPECT_TRUE(gate->released()) << testing::PrintToString(told);
+}
+
+TEST_F(GatedBase, DoesNotStartByItselfWhenHeldMeanwhile) {
+  make();
+  std::optional<Answer> answer;
+  boost::asio::co_spawn(io, gate->start(), [&](std::exception_ptr problem, Answer value) {
+    if (problem) std::rethrow_exception(problem);
+    answer = value;
+  });
+  wait(200ms);
+  gate->ask_hold();
+  wait(3s);
+  EXPECT_EQ(answer, Answer::not_enough);
+  release();
+  EXPECT_TRUE(gate->released());
+  EXPECT_THAT(told, Contains(HasSubstr("the robot is released")));
+}
+
+// --- What the mission knows.
+
+struct GatedSurroundings : GatedBase {
+  mission::Surroundings around;
+  void drive_there() {
+    drive_off();
+    around.range_at = std::nullopt;
+    gate->watch_surroundings([this] { return around; });
+    wait(1s);
+    ASSERT_GT(world.rolling().forward_mps, 0.39);
+  }
+};
+
+TEST_F(GatedSurroundings, HoldWhileThePoseIsUncertainAndNoLonger) {
+  drive_there();
+  const hal::Time began = clock.now();
+  around.pose_uncertain = true;
+  wait(500ms);
+  ASSERT_TRUE(zero_after(began));
+  EXPECT_LE(*zero_after(began) - began, mission::kGatePeriod + kFrameTime);
+  EXPECT_EQ(gate->mode(), Mode::holding);
+  EXPECT_EQ(gate->held_by(), FaultCode::pose_uncertain);
+  EXPECT_THAT(gate->why(), HasSubstr("F320-pose-uncertain"));
+  EXPECT_THAT(told, Contains(HasSubstr("the robot holds: F320")));
+  EXPECT_EQ(told_mission.back(), errc::operation_not_permitted);
+  around.pose_uncertain = false;
+  wait(1s);
+  EXPECT_GT(world.rolling().forward_mps, 0.39) << "nobody has to release it";
+}
+
+TEST_F(GatedSurroundings, HoldWhenTheRangeSourceIsSilentFor250ms) {
+  drive_there();
+  around.range_at = clock.now();
+  const hal::Time last = clock.now();
+  wait(245ms);
+  EXPECT_GT(world.rolling().forward_mps, 0.39);
+  wait(300ms);
+  ASSERT_TRUE(zero_after(last));
+  EXPECT_LE(*zero_after(last) - last, 250ms + mission::kGatePeriod + kFrameTime);
+  EXPECT_EQ(gate->held_by(), FaultCode::range_stale);
+  EXPECT_EQ(told_mission.back(), errc::resource_unavailable_try_again);
+  around.range_at.reset();  // Not at work any more.
+  wait(1s);
+  EXPECT_GT(world.rolling().forward_mps, 0.39);
+}
+
+TEST_F(GatedSurroundings, LimitTheSpeedOfMissionsAndStopThemWhereNobodyKnowsIt) {
+  drive_there();
+  around.zone_speed_max_mps = 0.15;
+  wait(1s);
+  EXPECT_NEAR(world.rolling().forward_mps, 0.15, 0.01);
+  around.zone_speed_max_mps = std::numeric_limits<double>::quiet_NaN();
+  wait(1s);
+  EXPECT_NEAR(world.rolling().forward_mps, 0, 0.01);
+  EXPECT_THAT(gate->why(), HasSubstr("drive it back by hand"));
+  for (std::uint32_t key = 1; key <= 10; ++key) {
+    gate->hear({.sequence = key, .dead_man = true, .twist = {-0.2, 0}});
+    wait(50ms);
+  }
+  EXPECT_LT(world.rolling().forward_mps, -0.05) << "a person sees where they drive";
+}
+
+TEST_F(GatedSurroundings, SendItHomeOnTheBatterysReserve) {
+  drive_there();
+  around.battery_reserve = true;
+  wait(100ms);
+  EXPECT_EQ(gate->mode(), Mode::returning);
+  EXPECT_GT(world.rolling().forward_mps, 0.39);
+}
+
+TEST_F(GatedBase, IsIdleWhenTheMissionIsOver) {
+  drive_off();
+  gate->finish();
+  wait(100ms);
+  EXPECT_EQ(gate->mode(), Mode::idle);
+}
+
+// --- An operator.
+
+struct GatedByHand : GatedBase {
+  std::uint32_t sequence = 0;
+  void press(hal::Twist by_hand, bool held = true) { gate->hear({++sequence, held, by_hand}); }
+  void hold(hal::Twist by_hand, hal::Duration span) {
+    for (hal::Duration passed{}; passed < span; passed += 50ms) {
+      press(by_hand);
+      wait(50ms);
+    }
+  }
+};
+
+TEST_F(GatedByHand, StopWithinOnePeriodOfTheDeadMansRelease) {
+  drive_off();
+  hold({0.3, 0}, 1s);
+  EXPECT_EQ(gate->mode(), Mode::teleop);
+  EXPECT_EQ(told_mission.back(), errc::operation_not_permitted) << "the mission drives, too";
+  plans = false;
+  wait(13ms);
+  const hal::Time released = clock.now();
+  press({}, false);
+  wait(100ms);
+  ASSERT_TRUE(zero_after(released));
+  EXPECT_LE(*zero_after(released) - released, mission::kGatePeriod + kFrameTime);
+}
+
+TEST_F(GatedByHand, StopAfter200msOfSilenceAndForReplays) {
+  drive_off();
+  plans = false;
+  hold({0.3, 0}, 1s);
+  const hal::Time last = clock.now() - 50ms;
+  wait(400ms);
+  ASSERT_TRUE(zero_after(last));
+  EXPECT_LE(*zero_after(last) - last, 200ms + mission::kGatePeriod + kFrameTime);
+  const hal::Time replayed = clock.now();
+  for (std::uint32_t old = 1; old <= sequence; ++old) {
+    gate->hear({old, true, {0.3, 0}});
+    wait(20ms);
+  }
+  EXPECT_EQ(moving_after(replayed), 0);
+}
+
+TEST_F(GatedByHand, MoveNothingThatWasNotReleased) {
+  make();
+  ASSERT_EQ(start(), Answer::released);
+  gate->ask_hold();
+  wait(100ms);
+  const hal::Time held = clock.now();
+  hold({0.3, 0}, 1s);
+  EXPECT_EQ(moving_after(held), 0);
 }
 
 // --- The drive's own time-out.
