@@ -105,6 +105,13 @@ struct SimConfig {
   int people = 0;              // Who walk about in the robot's area.
 };
 
+// [console] of the robot file: where an operator may sit; empty: there is no such place.
+struct ConsoleConfig {
+  std::string serial;                                          // A port, at 115200 8N1.
+  std::string socket;                                          // Of `vantage console`.
+  std::string password = "/var/lib/vantage/console.password";  // The file that keeps its hash.
+};
+
 // [battery] of the robot file: what plans and missions reckon with. Watts are all that the robot
 // draws in that state, scanner and computers included.
 struct BatteryConfig {
@@ -126,6 +133,7 @@ struct RobotConfig {
   ImuConfig imu;
   GnssConfig gnss;
   PowerConfig power;
+  ConsoleConfig console;
   BatteryConfig battery;
   SimConfig sim;
 };
@@ -156,7 +164,8 @@ struct Phase2Config {
 
 // [localize]
 struct LocalizeConfig {
-  bool match_map = true;  // Every scan's walls against those of the map.
+  bool match_map = true;     // Every scan's walls against those of the map.
+  double sigma_max_m = 1.0;  // Of the pose, along its worse axis: less sure, the robot stands.
 };
 
 // [register]

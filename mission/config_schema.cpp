@@ -130,7 +130,10 @@ SectionSpec localize_section() {
           "Where the robot is.",
           {keys.other("match_map", &L::match_map,
                       "Lay the walls that a scan shows over those of the map: where satellites "
-                      "are not seen, that holds the robot to the map")},
+                      "are not seen, that holds the robot to the map"),
+           keys.number("sigma_max_m", &L::sigma_max_m, 0.05, 1000, "m",
+                       "1 sigma of the position, along its worse axis, beyond which the robot "
+                       "stands: it no longer knows where it is")},
           {},
           {}};
 }
@@ -301,6 +304,21 @@ SectionSpec power_section() {
            keys.other("board_link", &P::board_link,
                       "A Waveshare relay board: modbus-rtu:/dev/ttyUSB2@9600N/UNIT"),
            keys.other("safety_link", &P::safety_link, "A Pilz PNOZmulti: modbus-tcp:HOST:502/1")},
+          {},
+          {}};
+}
+
+SectionSpec console_section() {
+  using O = ConsoleConfig;
+  const Keys<O> keys{[](MissionConfig& c) -> O& { return c.robot.console; }};
+  return {ConfigFile::robot,
+          "console",
+          "Where an operator may sit; without these keys there is no console.",
+          {keys.other("serial", &O::serial, "A serial port, 115200 8N1: /dev/ttyS0"),
+           keys.other("socket", &O::socket,
+                      "A UNIX socket for `vantage console`: /run/vantage/console.sock"),
+           keys.other("password", &O::password,
+                      "File that keeps the password's argon2id hash; made by `set-password`")},
           {},
           {}};
 }
@@ -478,8 +496,8 @@ const std::vector<SectionSpec>& config_schema() {
       mission_section(),  phase1_section(),  phase2_section(), localize_section(),
       register_section(), regions_section(), robot_section(),  body_section(),
       drive_section(),    scanner_section(), pan_section(),    obstacles_section(),
-      imu_section(),      gnss_section(),    power_section(),  battery_section(),
-      sim_section(),      plan_section(),    station_section()};
+      imu_section(),      gnss_section(),    power_section(),  console_section(),
+      battery_section(),  sim_section(),     plan_section(),   station_section()};
   return schema;
 }
 

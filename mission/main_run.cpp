@@ -134,6 +134,7 @@ RunOutcome run_in_simulation(Prepared& prepared, const RunOptions& options) {
   hal::ComputeHere compute;
   Survey survey(prepared.config, prepared.site.map, prepared.tasks, options.threads,
                 {backend.clock(), backend.devices(), store, progress, compute});
+  backend.gate().watch_surroundings([&survey] { return survey.surroundings(); });
   RunRecord& record = survey.record();
   record.repairs = prepared.site.repairs;
   record.notes.insert(record.notes.begin(), prepared.notes.begin(), prepared.notes.end());

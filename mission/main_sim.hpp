@@ -69,6 +69,7 @@ class SimBackend {
   RobotUnits& units() { return robot_.units(); }
   SimulatedRobot& robot() { return robot_; }
   GatedDrive& gate() { return gate_; }
+  sim::World& world() { return true_site_.world(); }
   // What stopped and released the robot, in words.
   const std::vector<std::string>& events() const { return events_; }
   // Starts units and drivers, and runs until done() holds. False when they ended by themselves, or

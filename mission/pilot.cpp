@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "hal/angles.hpp"
+#include "hal/together.hpp"
 #include "nav/polygons.hpp"
 
 namespace mission {
@@ -188,8 +189,10 @@ hal::Task<LegEnd> Pilot::drive_to(Roads& roads, hal::Pose2 goal) {
   looked_at_.reset();
   // One that does not start leaves the robot blind: the way ends with that reason.
   if (devices_.obstacles) (void)co_await devices_.obstacles->start();
+  if (devices_.obstacles) looks_since_ = clock_.now();
   const double before_m = travelled_m_;
   LegEnd leg = co_await drive_on(roads, goal);
+  looks_since_.reset();
   if (devices_.obstacles) (void)co_await devices_.obstacles->stop();
   obstacles_.clear();  // By the next leg the world has moved on.
   leg.driven_m = travelled_m_ - before_m;
@@ -337,6 +340,8 @@ hal::Task<boost::system::error_code> Pilot::tell_drive(hal::Twist twist, LegEnd&
   const auto told = co_await devices_.drive.command(twist);
   if (told) co_return boost::system::error_code{};
   if (told.error() == errc::io_error) co_return told.error();
+  // It stands for want of a look ahead: how long it does so here is not the drive's matter.
+  if (told.error() == errc::resource_unavailable_try_again) co_return boost::system::error_code{};
   co_return co_await wait_for_drive(told.error(), leg);
 }
 
@@ -352,7 +357,8 @@ hal::Task<boost::system::error_code> Pilot::wait_for_drive(boost::system::error_
     }
     co_await clock_.sleep_for(kAskAgain);
     const auto told = co_await devices_.drive.command({});
-    if (told) co_return boost::system::error_code{};
+    if (told || told.error() == errc::resource_unavailable_try_again)
+      co_return boost::system::error_code{};
     why = told.error();
   }
 }
@@ -361,6 +367,14 @@ hal::Task<boost::system::error_code> Pilot::wait_for_drive(boost::system::error_
 hal::Task<void> Pilot::halt() {
   (void)co_await devices_.drive.command({});
   co_await clock_.sleep_for(kHaltWait);
+}
+
+// A drive that is held may let a command wait for as long as it is.
+hal::Task<void> Pilot::abandon() {
+  looks_since_.reset();
+  co_await hal::first_of(halt(), clock_.sleep_for(kHaltWait));
+  if (devices_.obstacles) (void)co_await devices_.obstacles->stop();
+  obstacles_.clear();
 }
 
 hal::Task<void> Pilot::back_off() {

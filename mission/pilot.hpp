@@ -2,6 +2,7 @@
 // and the devices.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <vector>
@@ -58,6 +59,10 @@ class Pilot {
   // where it stands.
   hal::Task<LegEnd> drive_to(Roads& roads, hal::Pose2 goal);
 
+  // After drive_to was cancelled: the robot stands, as far as the drive obeys, and nothing looks
+  // ahead any more.
+  hal::Task<void> abandon();
+
   hal::Pose2 pose() const { return localizer_.pose(); }
   Eigen::Matrix3d covariance() const { return localizer_.covariance(); }
   // The same without what correct() was told: wheels, IMU, satellites and map only.
@@ -67,6 +72,11 @@ class Pilot {
   nav::Correction correct(const hal::Pose2& pose, const Eigen::Matrix3d& covariance);
   nav::Correction correct_by_map(const hal::Pose2& pose, const Eigen::Matrix3d& covariance);
   double travelled_m() const { return travelled_m_; }
+  // While it drives with a look at what is ahead: when the last profile came, or the scanner was
+  // told to start.
+  std::optional<hal::Time> range_at() const {
+    return looks_since_ ? std::max(looked_at_, looks_since_) : looks_since_;
+  }
   const GnssCounts& gnss() const { return sensors_.gnss(); }
   SensorLog& sensors() { return sensors_; }
 
@@ -106,7 +116,8 @@ class Pilot {
   SensorLog sensors_;
   nav::ObstacleMap obstacles_;
   std::optional<hal::Time> looked_at_;  // When the last profile came.
-  Eigen::Vector2d W_in_way_m_{0, 0};    // What ended the last route.
+  std::optional<hal::Time> looks_since_;
+  Eigen::Vector2d W_in_way_m_{0, 0};  // What ended the last route.
   std::optional<hal::Time> closed_for_now_at_;
   double travelled_m_{};  // By the wheels, since the start.
 };

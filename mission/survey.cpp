@@ -59,6 +59,7 @@ Survey::Survey(const MissionConfig& config, const nav::SiteMap& map, SiteTasks t
       threads_(threads),
       parts_(parts),
       began_(parts.clock.now()),
+      orders_(parts.clock),
       pilot_(config.robot, parts.clock, parts.devices, tasks_.start),
       model_(std::make_unique<SiteModel>(config, map, tasks_.tasks, threads)),
       matcher_(config.localize.match_map ? std::make_unique<MapMatcher>(map, config.robot.scanner)
@@ -86,6 +87,7 @@ Survey::Survey(const MissionConfig& config, const nav::SiteMap& map, SiteTasks t
 
 hal::Task<void> Survey::run() {
   std::exception_ptr failure;
+  orders_.begin(tasks_.start_area >= 0);
   try {
     // The survey decides when it is over; the pilot only keeps it company.
     co_await hal::first_of(survey(), pilot_.track());
@@ -97,6 +99,8 @@ hal::Task<void> Survey::run() {
         stop_reason_.empty() ? fmt::format("a device failed: {}", error.what()) : stop_reason_;
     failure = std::current_exception();
   }
+  orders_.end();
+  note_given();
   record_.mission_s = now_s();
   note_sensors();
   note_gnss();
@@ -115,13 +119,24 @@ hal::Task<void> Survey::run() {
 
 hal::Task<void> Survey::survey() {
   co_await plan_stations();
+  bool ordered_home = false;
+  try {
+    co_await look_around();
+  } catch (const OrderedHome& why) {
+    record_.end = why.what();
+    ordered_home = true;
+  }
+  if (ordered_home) co_await leave_for_home();
+  co_await go_home(ordered_home);
+  note_box();
+  record_.completed = !ordered_home;
+}
+
+hal::Task<void> Survey::look_around() {
   for (std::size_t t = 0; t < record_.plans.size(); ++t) co_await tour(t);
   if (record_.scans.empty()) throw CannotGoOn(why_no_scan());
   co_await close_tour();
   co_await refine();
-  co_await go_home();
-  note_box();
-  record_.completed = true;
 }
 
 // Nothing seen is nothing to go on from: no next best view could follow.
@@ -211,7 +226,8 @@ void Survey::take_plans(std::vector<PlannedArea> all) {
 
 hal::Task<void> Survey::tour(std::size_t t) {
   const AreaPlan& plan = record_.plans[t];
-  for (const int s : plan.tour) {
+  for (std::size_t at = 0; at < plan.tour.size();) {
+    const int s = plan.tour[at];
     const planning::Station& station = plan.cover.stations[static_cast<std::size_t>(s)];
     // Named: GCC 12 destroys an aggregate made inside a co_await expression twice.
     const Stop stop{.name = station_name(plan, s),
@@ -220,6 +236,11 @@ hal::Task<void> Survey::tour(std::size_t t) {
                     .station = &station,
                     .view = nullptr};
     co_await visit(stop);
+    if (std::exchange(put_off_, false)) {
+      co_await retour(t, at);
+      continue;
+    }
+    ++at;
     ++stations_done_;
     covered_m_ += station.adds_m;
   }
@@ -291,7 +312,7 @@ hal::Task<void> Survey::leave(std::string reason, bool stopped_for_gain) {
 }
 
 // Goes to the stop by robot or by hand and scans. False: dropped, with the reason on record.
-hal::Task<bool> Survey::visit(const Stop& stop) {
+hal::Task<bool> Survey::visit_now(const Stop& stop) {
   show(stop);
   ScanRecord scan;
   scan.name = stop.name;
@@ -307,6 +328,7 @@ hal::Task<bool> Survey::visit(const Stop& stop) {
   if (!scan.by_hand && !affords(stop)) co_return false;
   const bool there = scan.by_hand ? co_await carry(stop, scan) : co_await drive(stop, scan);
   if (!there) co_return false;
+  orders_.scanning(true);
   const bool scanned = co_await acquire(stop, std::move(scan));
   co_return scanned;
 }
@@ -504,18 +526,19 @@ void Survey::show(const Stop& stop) {
   progress.mission_s = now_s();
   // What a station has taken so far, road and set-up included, is the best guess of the next one.
   if (!stop.view && scanned > 0) progress.eta_s = now_s() / scanned * left;
+  shown_ = progress;
   parts_.progress.show(progress);
 }
 
-hal::Task<void> Survey::go_home() {
-  if (!config_.return_home || tasks_.start_area < 0) co_return;
+// Ordered or not: on the way a person may still take over.
+hal::Task<void> Survey::go_home(bool ordered) {
+  if ((!config_.return_home && !ordered) || tasks_.start_area < 0) co_return;
   const Stop home{.name = "home",
                   .task = tasks_.start_area,
                   .pose = tasks_.start,
                   .station = nullptr,
                   .view = nullptr};
-  ScanRecord unused;
-  co_await drive(home, unused);
+  co_await visit(home);
 }
 
 }  // namespace mission

@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,8 @@
 #include "mission/scan_spool.hpp"
 #include "mission/site_model.hpp"
 #include "mission/store.hpp"
+#include "mission/surroundings.hpp"
+#include "mission/survey_orders.hpp"
 
 namespace mission {
 
@@ -50,6 +53,12 @@ class Survey {
   RunRecord& record() { return record_; }
   const SiteModel& model() const { return *model_; }
   const CloudMerger& cloud() const { return cloud_; }
+  // What a person orders of it.
+  SurveyOrders& orders() { return orders_; }
+  const Pilot& pilot() const { return pilot_; }
+  // For the gate; does not allocate.
+  Surroundings surroundings();
+  const std::optional<Progress>& shown() const { return shown_; }  // The latest; nothing: none yet.
 
  private:
   // Where the next scan is to be taken, and why.
@@ -62,11 +71,12 @@ class Survey {
   };
 
   hal::Task<void> survey();
+  hal::Task<void> look_around();
   hal::Task<void> plan_stations();
   void take_plans(std::vector<PlannedArea> planned);
   hal::Task<void> tour(std::size_t task);
   hal::Task<void> refine();
-  hal::Task<void> go_home();
+  hal::Task<void> go_home(bool ordered);
   std::string why_no_scan() const;
   void note_box();
   void note_gnss();
@@ -79,7 +89,20 @@ class Survey {
   void note_forecasts();
   void note_energy();
 
+  // In survey_ordered.cpp.
   hal::Task<bool> visit(const Stop& stop);
+  hal::Task<void> visit_into(const Stop& stop, bool& done);
+  hal::Task<bool> finished(hal::Task<void> step);
+  hal::Task<void> obey();
+  hal::Task<void> run_errand(const SurveyOrders::Order& errand);
+  hal::Task<void> errand_into(const Stop& stop, bool scans, bool& done);
+  hal::Task<void> wait_for_orders();
+  hal::Task<void> leave_for_home();
+  hal::Task<void> retour(std::size_t task, std::size_t done);
+  void note_given();
+  void tell(const std::string& what);
+
+  hal::Task<bool> visit_now(const Stop& stop);
   hal::Task<bool> drive(const Stop& stop, ScanRecord& scan);
   hal::Task<bool> carry(const Stop& stop, ScanRecord& scan);
   hal::Task<bool> acquire(const Stop& stop, ScanRecord scan);
@@ -123,6 +146,7 @@ class Survey {
   Parts parts_;
   const hal::Time began_;
   std::string stop_reason_;
+  SurveyOrders orders_;
   Pilot pilot_;
   std::unique_ptr<SiteModel> model_;
   std::unique_ptr<MapMatcher> matcher_;  // Null: not asked for.
@@ -144,8 +168,18 @@ class Survey {
   std::vector<double> tour_legs_s_;  // Drives from station to station of the robot's tour.
   std::size_t tours_next_{};         // Station of it after the one that is next.
   bool battery_low_{};               // For the last stop that was thought of.
+  bool put_off_{};  // The stop was not visited: the stations left get a new order first.
+  int errands_{};   // Scans that a person ordered.
+  std::optional<Progress> shown_;
+  Eigen::Vector2d zone_at_m_{0, 0};  // Where the zone was looked up last.
+  std::optional<double> zone_speed_mps_;
   CloudMerger cloud_;
   RunRecord record_;
+};
+
+// A person wants the robot home, now. what() is for the record.
+struct OrderedHome : std::runtime_error {
+  using runtime_error::runtime_error;
 };
 
 }  // namespace mission

@@ -117,6 +117,7 @@ views_ahead = 2
 density_min_ppm2 = 25
 [localize]
 match_map = false
+sigma_max_m = 2
 [register]
 scans = false
 references_max = 3
@@ -166,6 +167,10 @@ link = "tcp:localhost:2947"
 battery_link = "modbus-tcp:cerbo:502/225"
 board_link = "modbus-rtu:/dev/relays@9600N/1"
 safety_link = "modbus-tcp:pilz:502/1"
+[console]
+serial = "/dev/ttyS0"
+socket = "/run/vantage/console.sock"
+password = "/etc/vantage/password"
 [scanner]
 device = "sick-lms1xx"
 link = "tcp:lms:2112"
@@ -234,6 +239,7 @@ phase2.choose=gain_per_minute
 phase2.views_ahead=2
 phase2.density_min_ppm2=25
 localize.match_map=false
+localize.sigma_max_m=2
 register.scans=false
 register.references_max=3
 register.in_hand_max=20
@@ -294,6 +300,9 @@ robot.gnss.link=tcp:localhost:2947
 robot.power.battery_link=modbus-tcp:cerbo:502/225
 robot.power.board_link=modbus-rtu:/dev/relays@9600N/1
 robot.power.safety_link=modbus-tcp:pilz:502/1
+robot.console.serial=/dev/ttyS0
+robot.console.socket=/run/vantage/console.sock
+robot.console.password=/etc/vantage/password
 robot.battery.capacity_wh=900
 robot.battery.drive_w=150
 robot.battery.scan_w=40
