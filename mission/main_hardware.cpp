@@ -12,6 +12,7 @@
 
 #include "drivers/real_clock.hpp"
 #include "hal/together.hpp"
+#include "mission/main_console.hpp"
 #include "mission/main_serving.hpp"
 #include "mission/main_worker.hpp"
 
@@ -109,7 +110,9 @@ GuardedSurvey::GuardedSurvey(const Prepared& prepared, int threads, Config confi
                [&drivers = parts.drivers] { return drivers.complaints(); },
                parts.drivers.obstacles()},
       survey_(prepared.config, prepared.site.map, prepared.tasks, threads,
-              {parts.clock, devices_, parts.store, parts.progress, parts.compute}) {}
+              {parts.clock, devices_, parts.store, parts.progress, parts.compute}) {
+  gate_.watch_surroundings([this] { return survey_.surroundings(); });
+}
 
 DeviceWatch::Config GuardedSurvey::watched(DeviceWatch::Config config) {
   config.held = [this] { return gate_.held_by_people(); };
@@ -230,13 +233,24 @@ RunOutcome run_on_hardware(Prepared& prepared, const RunOptions& options) {
       fmt::format("{}run `{}`", robot.power.board_link.empty() ? "" : "press its reset button or ",
                   serving ? "systemctl kill --kill-whom=main -s USR1 vantage"
                           : fmt::format("kill -USR1 {}", getpid()));
-  config.watch.tell = [&progress](const std::string& what) { progress.message(what); };
+  std::unique_ptr<Consoles> consoles;
+  config.watch.tell = [&](const std::string& what) {
+    progress.message(what);
+    if (consoles) consoles->hub().tell(what);
+  };
   GuardedSurvey guarded(prepared, options.threads, config,
                         {io, clock, drivers, store, progress, worker});
   const Signals signals(io, guarded, options.service);
+  Worker passwords;  // Planning must not keep anybody from logging in.
+  if (!robot.console.serial.empty() || !robot.console.socket.empty())
+    consoles = std::make_unique<Consoles>(
+        robot.console,
+        RobotConsole::Parts{guarded.gate(), guarded.survey(), drivers, config.watch.link_troubles},
+        io, clock, passwords);
   guarded.start();
   if (serving) serving->begin();
   while (!guarded.ended()) io.run_one();
+  if (consoles) consoles->end();
   if (serving) serving->end();
   progress.finish();
   RunRecord& record = guarded.survey().record();
