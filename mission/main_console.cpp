@@ -141,7 +141,10 @@ Consoles::Consoles(const ConsoleConfig& config, RobotConsole::Parts parts,
 void Consoles::end() {
   closing_ = true;
   cancel_.emit(boost::asio::cancellation_type::terminal);
-  while (!over_) io_.run_one();
+  while (!over_) {
+    io_.restart();
+    io_.run_one();
+  }
 }
 
 }  // namespace mission

@@ -82,9 +82,12 @@ class Consoles {
   // Hears what happens; the parts, io and clock must outlive it.
   Consoles(const ConsoleConfig& config, RobotConsole::Parts parts, boost::asio::io_context& io,
            hal::Clock& clock, hal::Compute& compute);
+  ~Consoles() { end(); }
+  Consoles(const Consoles&) = delete;
+  Consoles& operator=(const Consoles&) = delete;
 
   ConsoleHub& hub() { return hub_; }
-  // Closes all of them, and returns when that is done.
+  // Closes all of them, and returns when that is done. Called again: nothing.
   void end();
 
  private:

@@ -233,6 +233,8 @@ RunOutcome run_on_hardware(Prepared& prepared, const RunOptions& options) {
       fmt::format("{}run `{}`", robot.power.board_link.empty() ? "" : "press its reset button or ",
                   serving ? "systemctl kill --kill-whom=main -s USR1 vantage"
                           : fmt::format("kill -USR1 {}", getpid()));
+  const bool has_console = !robot.console.serial.empty() || !robot.console.socket.empty();
+  if (has_console) config.how_to_release += ", or type `arm` at its console";
   std::unique_ptr<Consoles> consoles;
   config.watch.tell = [&](const std::string& what) {
     progress.message(what);
@@ -242,7 +244,7 @@ RunOutcome run_on_hardware(Prepared& prepared, const RunOptions& options) {
                         {io, clock, drivers, store, progress, worker});
   const Signals signals(io, guarded, options.service);
   Worker passwords;  // Planning must not keep anybody from logging in.
-  if (!robot.console.serial.empty() || !robot.console.socket.empty())
+  if (has_console)
     consoles = std::make_unique<Consoles>(
         robot.console,
         RobotConsole::Parts{guarded.gate(), guarded.survey(), drivers, config.watch.link_troubles},
