@@ -117,4 +117,25 @@ TEST_F(WaitingHardware, TakesASignalThatComesThreeTimesAtOnceForOne) {
   EXPECT_THAT(outcome.out, HasSubstr("NOT completed: stopped by SIGTERM"));
 }
 
+// Without a drive there is no mission yet; whoever sits at the console learns why.
+TEST_F(WaitingHardware, ServesItsConsoleBeforeThereIsAMission) {
+  const std::string folder = folder_.path().string(), socket = folder + "/console.sock";
+  write("yard/robot.toml", test::read_text(folder_.path() / "yard/robot.toml") +
+                               "\n[console]\nsocket = \"" + socket + "\"\npassword = \"" + folder +
+                               "/password\"\n");
+  const std::string ask = "sh -c 'until grep -qs waits " + folder + "/err; do sleep 0.2; done; " +
+                          "printf \"status\\rwhy\\rfaults\\rstop\\rarm\\r\" | " +
+                          VANTAGE_BINARY_DIR + "/vantage console --socket " + socket + " >" +
+                          folder + "/seen 2>&1; kill $PPID' & exec ";
+  const test::Outcome outcome = vantaged(ask);
+  EXPECT_EQ(outcome.code, 3) << outcome.err;
+  const std::string seen = test::read_text(folder_.path() / "seen");
+  EXPECT_THAT(seen, HasSubstr("mission  none"));
+  EXPECT_THAT(seen, HasSubstr("not all devices have started yet"));
+  EXPECT_THAT(seen, HasSubstr("F500-link-absent hold: drive: not there"));
+  EXPECT_THAT(seen, HasSubstr("the robot stands until `arm`"));
+  EXPECT_THAT(seen, HasSubstr("no password was set yet"));
+  EXPECT_FALSE(std::filesystem::exists(socket)) << "left behind";
+}
+
 }  // namespace
