@@ -100,6 +100,7 @@ Conditions GatedDrive::look(hal::Time now) {
   is.set(Condition::operator_alive, operator_alive(config_.gate, gate_, now));
   is.set(Condition::pose_uncertain, is_.pose_uncertain);
   is.set(Condition::range_stale, is_.range_at && now - *is_.range_at > config_.gate.range_max);
+  is.set(Condition::hold_fault, is_.hold_fault.has_value());
   is.set(Condition::battery_reserve, is_.battery_reserve);
   is.set(Condition::mission_loaded, loaded_);
   is.set(Condition::proven, proven_);
@@ -148,8 +149,8 @@ void GatedDrive::on_decision(const Decision& decision, Conditions conditions) {
 
 std::optional<FaultCode> GatedDrive::held_by() const {
   if (mode_ != Mode::holding || !supervisor_.released) return std::nullopt;
-  return conditions_.has(Condition::pose_uncertain) ? FaultCode::pose_uncertain
-                                                    : FaultCode::range_stale;
+  if (conditions_.has(Condition::pose_uncertain)) return FaultCode::pose_uncertain;
+  return is_.hold_fault ? is_.hold_fault : FaultCode::range_stale;
 }
 
 std::string GatedDrive::why() const {

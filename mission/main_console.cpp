@@ -21,11 +21,6 @@ std::string detail_of(const std::string& role, const drivers::Trouble& trouble) 
          (trouble.detail.empty() ? "" : ", " + trouble.detail);
 }
 
-// What the table calls the devices of a robot file.
-std::string_view role_of(std::string_view named) {
-  return named == "obstacles" ? "scanner" : named;
-}
-
 double worse_sigma_m(const Eigen::Matrix3d& covariance) {
   return std::sqrt(std::max(covariance(0, 0), covariance(1, 1)));
 }
@@ -42,7 +37,7 @@ std::vector<FaultNow> faults_now(const RobotDrivers& drivers, const LinkTroubles
       for (const drivers::Trouble& trouble : link_troubles(named.role))
         add(faults, fault_of("link", trouble.fault->name), detail_of(named.role, trouble));
     for (const drivers::Trouble& trouble : named.device->troubles())
-      add(faults, fault_of(role_of(named.role), trouble.fault->name),
+      add(faults, fault_of(fault_role(named.role), trouble.fault->name),
           detail_of(named.role, trouble));
   }
   std::ranges::stable_sort(

@@ -111,7 +111,11 @@ GuardedSurvey::GuardedSurvey(const Prepared& prepared, int threads, Config confi
                parts.drivers.obstacles()},
       survey_(prepared.config, prepared.site.map, prepared.tasks, threads,
               {parts.clock, devices_, parts.store, parts.progress, parts.compute}) {
-  gate_.watch_surroundings([this] { return survey_.surroundings(); });
+  gate_.watch_surroundings([this] {
+    Surroundings around = survey_.surroundings();
+    around.hold_fault = watch_.hold_fault();
+    return around;
+  });
 }
 
 DeviceWatch::Config GuardedSurvey::watched(DeviceWatch::Config config) {

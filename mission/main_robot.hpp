@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "drivers/device.hpp"
@@ -24,6 +25,11 @@ struct NamedDevice {
   std::string link;  // As written there.
   drivers::Device* device{};
 };
+
+// What the table of faults calls that role.
+constexpr std::string_view fault_role(std::string_view named) {
+  return named == "obstacles" ? "scanner" : named;
+}
 
 // What is wrong with the robot file that only the drivers can tell: settings that no such device
 // has. Empty: nothing.

@@ -36,6 +36,7 @@ DeviceWatch::DeviceWatch(Config config, const RobotDrivers& drivers, hal::Clock&
 hal::Task<void> DeviceWatch::run() {
   for (;;) {
     look();
+    look_for_holds();
     if (config_.held && config_.held()) lost_at_ = clock_.now();
     if (!well_ && clock_.now() - lost_at_ > config_.patience) break;
     co_await clock_.sleep_for(kLook);
@@ -64,6 +65,19 @@ void DeviceWatch::look() {
 
 void DeviceWatch::step(MissionStep step) const {
   if (config_.step) config_.step(step);
+}
+
+// Devices that are away stop the mission by themselves.
+void DeviceWatch::look_for_holds() {
+  hold_fault_.reset();
+  for (const NamedDevice& named : drivers_.devices()) {
+    if (away(named)) continue;
+    for (const drivers::Trouble& trouble : named.device->troubles()) {
+      const FaultCode code = fault_of(fault_role(named.role), trouble.fault->name);
+      const bool holds = entry_of(code).action == Action::hold;
+      if (holds && (!hold_fault_ || outweighs(code, *hold_fault_))) hold_fault_ = code;
+    }
+  }
 }
 
 hal::Task<void> DeviceWatch::until_well() {
@@ -122,9 +136,12 @@ hal::Task<hal::Result<void>> WatchedDrive::command(hal::Twist twist) {
   watch_.step(MissionStep::waits);
   co_await watch_.until_well();
   co_await drive_.until_released();
-  // Driven by a person, or held until it knows where it is.
-  while (drive_.mode() == Mode::teleop || drive_.held_by() == FaultCode::pose_uncertain)
-    co_await clock_.sleep_for(kTryAgain);
+  // Driven by a person, or held by what the mission can do nothing about.
+  const auto waits = [this] {
+    const auto by = drive_.held_by();
+    return drive_.mode() == Mode::teleop || (by && *by != FaultCode::range_stale);
+  };
+  while (waits()) co_await clock_.sleep_for(kTryAgain);
   watch_.step(MissionStep::goes_on);
   co_return hal::Result<void>{};
 }

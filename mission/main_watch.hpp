@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -38,6 +39,10 @@ class DeviceWatch {
   hal::Task<void> run();
   const std::string& given_up() const { return given_up_; }
 
+  // A fault of a device that runs, and for which the robot stands until it is over; the gravest.
+  // Nothing: there is none. Does not allocate.
+  std::optional<FaultCode> hold_fault() const { return hold_fault_; }
+
   // All devices run, as far as was seen; and until they do.
   bool well() const { return well_; }
   hal::Task<void> until_well();
@@ -53,6 +58,7 @@ class DeviceWatch {
 
  private:
   std::string missing_names() const;
+  void look_for_holds();
 
   const Config config_;
   const RobotDrivers& drivers_;
@@ -60,6 +66,7 @@ class DeviceWatch {
   hal::Wake back_;
   bool well_ = true;
   hal::Time lost_at_{};
+  std::optional<FaultCode> hold_fault_;
   std::string told_, given_up_;
   std::vector<std::string> notes_;
 };

@@ -168,6 +168,21 @@ TEST(GuardedSurvey, WaitsForAPersonAfterAnEstopHoweverLongItIsPressed) {
   EXPECT_THAT(sim.yard.notes(), HasSubstr("the robot was released after F001-estop-pressed"));
 }
 
+TEST(GuardedSurvey, StandsWhileAMotorIsTooHotAndGoesOnWhenItHasCooled) {
+  SimYard sim;
+  ASSERT_TRUE(sim.run_until_it_drives(1));
+  sim.yard.base().set_fault_bits(0, 0x02);
+  sim.clock.run_until(sim.clock.now() + 3s);
+  const double stopped_m = sim.yard.driven_m();
+  sim.clock.run_until(sim.clock.now() + 3min);
+  EXPECT_NEAR(sim.yard.driven_m(), stopped_m, 0.01);
+  EXPECT_THAT(sim.yard.notes(), HasSubstr("the robot holds: F020-drive-hot"));
+  sim.yard.base().set_fault_bits(0, 0);
+  ASSERT_TRUE(sim.run_to_the_end());
+  EXPECT_EQ(sim.yard.survey().failure(), "");
+  EXPECT_TRUE(sim.yard.survey().survey().record().completed);
+}
+
 TEST(GuardedSurvey, TakesAScanAgainThatLostItsScanner) {
   SimYard sim;
   const auto scans = [&] { return sim.yard.survey().survey().record().scans.size(); };

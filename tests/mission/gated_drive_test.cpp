@@ -361,6 +361,18 @@ TEST_F(GatedSurroundings, HoldWhileThePoseIsUncertainAndNoLonger) {
   EXPECT_GT(world.rolling().forward_mps, 0.39) << "nobody has to release it";
 }
 
+TEST_F(GatedSurroundings, HoldForAFaultOfADeviceUntilItIsOver) {
+  drive_there();
+  around.hold_fault = FaultCode::drive_hot;
+  wait(1s);
+  EXPECT_NEAR(world.rolling().forward_mps, 0, 0.01);
+  EXPECT_EQ(gate->held_by(), FaultCode::drive_hot);
+  EXPECT_THAT(told, Contains(HasSubstr("the robot holds: F020-drive-hot")));
+  around.hold_fault.reset();
+  wait(1s);
+  EXPECT_GT(world.rolling().forward_mps, 0.39);
+}
+
 TEST_F(GatedSurroundings, HoldWhenTheRangeSourceIsSilentFor250ms) {
   drive_there();
   around.range_at = clock.now();
