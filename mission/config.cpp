@@ -137,7 +137,7 @@ LoadedMission finish(Draft& draft) {
   return std::move(draft.loaded);
 }
 
-std::optional<std::string> read_file(const fs::path& file) {
+std::optional<std::string> text_in_file(const fs::path& file) {
   std::error_code ignored;
   if (fs::is_directory(file, ignored)) return std::nullopt;
   std::ifstream stream(file, std::ios::binary);
@@ -173,7 +173,7 @@ ConfigPlace place_of(const Draft& draft, const std::string& path) {
 std::optional<std::string> named_file(Draft& draft, const fs::path& mission_file,
                                       const std::string& key, fs::path& path) {
   path = relative_to(mission_file, path);
-  auto text = read_file(path);
+  auto text = text_in_file(path);
   if (!text)
     draft.fail(place_of(draft, key),
                fmt::format("{} file '{}' cannot be read (the path is relative to the mission "
@@ -187,7 +187,7 @@ void load_robot(Draft& draft, const fs::path& mission_file, const fs::path& repl
   if (!replacement.empty()) {
     path = replacement;
     draft.config().written["robot"] = {"--robot", 0, 0};
-    if (const auto text = read_file(path))
+    if (const auto text = text_in_file(path))
       return read_robot_text(draft, *text, path.generic_string());
     return draft.fail({"--robot", 0, 0}, fmt::format("robot file '{}' cannot be read{}",
                                                      path.generic_string(), guess_sibling(path)));
@@ -247,7 +247,7 @@ std::string ConfigError::text() const {
 LoadedMission load_mission(const fs::path& file, const Overrides& overrides) {
   Draft draft;
   draft.config().file = file.generic_string();
-  const auto text = file.empty() ? std::string() : read_file(file);
+  const auto text = file.empty() ? std::string() : text_in_file(file);
   if (!text) {
     draft.fail({file.generic_string(), 0, 0}, "mission file cannot be read" + guess_sibling(file));
     return std::move(draft.loaded);

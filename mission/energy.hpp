@@ -42,6 +42,10 @@ class EnergyBook {
   void scanned(double span_s);
   void stood(double span_s) { spent_.idle_s += span_s; }
 
+  // Goes on from what an earlier part of the run has spent.
+  void take_up(const EnergyTimes& spent, int scans) { spent_ = spent, scans_ = scans; }
+  int scans() const { return scans_; }
+
   const EnergyTimes& spent() const { return spent_; }
   double used_wh() const { return energy_wh(battery_, spent_); }
   double left_wh() const { return battery_.capacity_wh - used_wh(); }

@@ -3,13 +3,10 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
-#include <sys/uio.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <boost/system/system_error.hpp>
 #include <cerrno>
-#include <vector>
 
 namespace mission {
 namespace {
@@ -36,30 +33,13 @@ class Descriptor {
   int fd_;
 };
 
-bool write_all(int fd, std::vector<iovec> pieces) {
-  std::size_t first = 0;
-  while (first < pieces.size()) {
-    const ssize_t wrote = ::writev(fd, &pieces[first], static_cast<int>(pieces.size() - first));
-    if (wrote < 0 && errno == EINTR) continue;
-    if (wrote < 0) return false;
-    auto left = static_cast<std::size_t>(wrote);
-    while (first < pieces.size() && left >= pieces[first].iov_len) left -= pieces[first++].iov_len;
-    if (first == pieces.size()) break;
-    pieces[first].iov_base = static_cast<char*>(pieces[first].iov_base) + left;
-    pieces[first].iov_len -= left;
-  }
-  return true;
-}
-
 bool write_and_flush(const std::filesystem::path& part,
                      std::initializer_list<std::string_view> pieces) {
-  Descriptor file(::open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+  Descriptor file(file_calls().open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
   if (!file.ok()) return false;
-  std::vector<iovec> vectors;
-  for (const std::string_view piece : pieces) {
-    if (!piece.empty()) vectors.push_back({const_cast<char*>(piece.data()), piece.size()});
-  }
-  return write_all(file.get(), std::move(vectors)) && ::fsync(file.get()) == 0 && file.close();
+  for (const std::string_view piece : pieces)
+    if (!write_fully(file.get(), piece)) return false;
+  return file_calls().fsync(file.get()) == 0 && file.close();
 }
 
 bool flush_folder(const std::filesystem::path& folder) {
@@ -67,10 +47,69 @@ bool flush_folder(const std::filesystem::path& folder) {
       ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (!opened.ok()) return false;
   // Some file systems cannot flush a folder; there the rename is as durable as it gets.
-  return ::fsync(opened.get()) == 0 || errno == EINVAL || errno == ENOTSUP;
+  return file_calls().fsync(opened.get()) == 0 || errno == EINVAL || errno == ENOTSUP;
 }
 
+FileCalls* calls_set = nullptr;
+
 }  // namespace
+
+int FileCalls::open(const char* path, int flags, unsigned mode) {
+  return ::open(path, flags, mode);
+}
+
+std::ptrdiff_t FileCalls::write(int fd, const void* bytes, std::size_t count) {
+  return ::write(fd, bytes, count);
+}
+
+std::ptrdiff_t FileCalls::pwrite(int fd, const void* bytes, std::size_t count, std::int64_t at) {
+  return ::pwrite(fd, bytes, count, at);
+}
+
+int FileCalls::fsync(int fd) {
+  return ::fsync(fd);
+}
+
+int FileCalls::ftruncate(int fd, std::int64_t bytes) {
+  return ::ftruncate(fd, bytes);
+}
+
+int FileCalls::rename(const char* from, const char* to) {
+  return ::rename(from, to);
+}
+
+int FileCalls::unlink(const char* path) {
+  return ::unlink(path);
+}
+
+std::int64_t FileCalls::bytes_free(const char* folder) {
+  std::error_code unknown;
+  const auto space = std::filesystem::space(folder, unknown);
+  return unknown ? -1 : static_cast<std::int64_t>(space.available);
+}
+
+FileCalls& file_calls() {
+  static FileCalls system;
+  return calls_set == nullptr ? system : *calls_set;
+}
+
+void set_file_calls(FileCalls* calls) {
+  calls_set = calls;
+}
+
+bool write_fully(int fd, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const std::ptrdiff_t wrote = file_calls().write(fd, bytes.data(), bytes.size());
+    if (wrote < 0 && errno == EINTR) continue;
+    if (wrote < 0) return false;
+    if (wrote == 0) {  // Would go on for ever.
+      errno = ENOSPC;
+      return false;
+    }
+    bytes.remove_prefix(static_cast<std::size_t>(wrote));
+  }
+  return true;
+}
 
 std::string FileError::text() const {
   const std::string why = detail.empty() ? code.message() : detail;
@@ -78,7 +117,7 @@ std::string FileError::text() const {
 }
 
 void throw_exception_from_error(const FileError& error, const boost::source_location&) {
-  throw boost::system::system_error(error.code, error.text());
+  throw FileFailure(error);
 }
 
 std::filesystem::path part_name(const std::filesystem::path& path) {
@@ -88,9 +127,9 @@ std::filesystem::path part_name(const std::filesystem::path& path) {
 FileResult<void> write_file(const std::filesystem::path& path,
                             std::initializer_list<std::string_view> pieces) {
   const auto part = part_name(path);
-  if (!write_and_flush(part, pieces) || ::rename(part.c_str(), path.c_str()) != 0) {
+  if (!write_and_flush(part, pieces) || file_calls().rename(part.c_str(), path.c_str()) != 0) {
     const auto code = last_error();
-    ::unlink(part.c_str());
+    file_calls().unlink(part.c_str());
     return FileError{path, "write", code};
   }
   if (!flush_folder(path.parent_path())) return FileError{path, "write", last_error()};

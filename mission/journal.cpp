@@ -57,8 +57,10 @@ void JournalFile::Close::operator()(sqlite3* db) const {
 }
 
 FileError JournalFile::error(std::string doing, int result) const {
-  return {path_, std::move(doing), code_of(result, sqlite3_system_errno(db_.get())),
-          sqlite3_errmsg(db_.get())};
+  const auto code = code_of(result, sqlite3_system_errno(db_.get()));
+  const bool busy = code == make_error_code(errc::device_or_resource_busy);
+  return {path_, std::move(doing), code,
+          busy ? "another program has it open" : sqlite3_errmsg(db_.get())};
 }
 
 FileResult<JournalFile> JournalFile::open(const std::filesystem::path& path) {
@@ -180,10 +182,16 @@ hal::Task<void> Journal::run() {
   for (;;) {
     while (waiting_.empty()) co_await came_.wait();
     const hal::Time next = clock_.now() + kPause;
-    co_await write(std::exchange(waiting_, {}));
+    co_await write(taken());
     went_.notify();
     co_await clock_.sleep_until(next);
   }
+}
+
+std::deque<std::shared_ptr<Journal::Waiting>> Journal::taken() {
+  auto batch = std::exchange(again_, {});
+  for (auto& each : std::exchange(waiting_, {})) batch.push_back(std::move(each));
+  return batch;
 }
 
 hal::Task<void> Journal::write(std::deque<std::shared_ptr<Waiting>> batch) {
@@ -195,11 +203,29 @@ hal::Task<void> Journal::write(std::deque<std::shared_ptr<Waiting>> batch) {
   ++commits_;
   for (std::size_t i = 0; i < batch.size(); ++i) {
     batch[i]->done = true;
+    if (!outcome && batch[i]->told && again_.size() < kToldMax) again_.push_back(batch[i]);
     if (outcome)
       batch[i]->outcome = events[i].number;
     else
       batch[i]->outcome = outcome.error();
   }
+}
+
+void Journal::tell(std::string kind, std::string text) {
+  if (waiting_.size() >= kToldMax) return;
+  const auto mine = std::make_shared<Waiting>();
+  mine->event = {0, clock_.now(), std::move(kind), std::move(text)};
+  mine->told = true;
+  waiting_.push_back(mine);
+  came_.notify();
+}
+
+FileResult<void> Journal::append_now(std::string kind, std::string text) {
+  std::vector<JournalEvent> events;
+  for (const auto& each : taken()) events.push_back(std::move(each->event));
+  events.push_back({0, clock_.now(), std::move(kind), std::move(text)});
+  ++commits_;
+  return file_.append(events);
 }
 
 hal::Task<FileResult<std::int64_t>> Journal::append(std::string kind, std::string text) {

@@ -72,20 +72,31 @@ class Journal {
   // Its number, once it is durable; or why it is not, and then it does not count. Needs run().
   hal::Task<FileResult<std::int64_t>> append(std::string kind, std::string text);
 
+  // The same for what nobody waits for: with the next commit, before whatever comes after it. Of
+  // more than kToldMax that wait the newest is lost. What could not be written is tried again.
+  void tell(std::string kind, std::string text);
+  static constexpr std::size_t kToldMax = 4096;
+
+  // What still waits, and this, at once: blocks. Only while run() does not.
+  FileResult<void> append_now(std::string kind, std::string text);
+
   std::int64_t commits() const { return commits_; }
 
  private:
   struct Waiting {
     JournalEvent event;
     FileResult<std::int64_t> outcome{0};
+    bool told = false;  // Nobody waits for it.
     bool done = false;
   };
+  std::deque<std::shared_ptr<Waiting>> taken();
   hal::Task<void> write(std::deque<std::shared_ptr<Waiting>> batch);
 
   JournalFile file_;
   hal::Clock& clock_;
   hal::Compute& compute_;
   std::deque<std::shared_ptr<Waiting>> waiting_;
+  std::deque<std::shared_ptr<Waiting>> again_;  // Told, and could not be written: goes first.
   hal::Wake came_, went_;
   std::int64_t commits_ = 0;
 };

@@ -9,11 +9,12 @@
 
 #include "mission/main_hardware.hpp"
 #include "mission/main_service.hpp"
+#include "mission/resume.hpp"
 
 namespace {
 
 // Exit codes: what the operator's scripts may rely on.
-constexpr int kDone = 0, kFailed = 1, kRefused = 2, kStopped = 3;
+constexpr int kDone = 0, kFailed = 1, kRefused = 2, kStopped = 3, kUnfinished = 4;
 
 struct Options {
   std::filesystem::path mission;
@@ -24,6 +25,8 @@ struct Options {
   int threads = 0;
   bool quiet = false;
   bool service = false;
+  bool resume = false, restart = false;
+  std::vector<std::string> skip;
 };
 
 int refuse(const std::vector<mission::ConfigError>& errors) {
@@ -84,8 +87,51 @@ std::vector<mission::ConfigError> service_problems(const mission::Prepared& prep
   return errors;
 }
 
+// Before anything else is read: within a second or two.
+std::optional<int> offer(const Options& options) {
+  if (options.resume || options.restart) return std::nullopt;
+  const auto left = mission::find_left_run(options.out);
+  if (!left) {
+    fmt::print(stderr, "vantaged: {}; begin anew with --restart\n", left.error().text());
+    return kRefused;
+  }
+  if (!left->has_value()) return std::nullopt;
+  fmt::print("{}", mission::offer_text(**left, options.out));
+  return kUnfinished;
+}
+
+struct RunPlace {
+  std::filesystem::path folder;
+  bool resume{};
+};
+
+// A service goes on with the run that it left, once a person has released the robot; where that
+// cannot be, it says why and begins another one: nothing of the old one is touched.
+RunPlace service_run(const std::filesystem::path& runs, const mission::Prepared& prepared,
+                     mission::Service& service) {
+  const std::filesystem::path last = mission::last_run_folder(runs);
+  if (!last.empty()) {
+    const auto left = mission::find_left_run(last);
+    if (!left) {
+      service.log(fmt::format("begins a new run: {}", left.error().text()));
+    } else if (left->has_value()) {
+      const auto now = mission::run_inputs(prepared.mission_file, prepared.config).value();
+      const auto& begun = (*left)->history.begun;
+      const std::vector<std::string> changed =
+          begun ? mission::changed_inputs(*begun, now)
+                : std::vector<std::string>{"its journal lacks the beginning"};
+      service.log(mission::offer_text(**left, last));
+      if (changed.empty()) return {last, true};
+      service.log("begins a new run instead: " + changed.front());
+    }
+  }
+  return {mission::next_run_folder(runs), false};
+}
+
 int run(const Options& options) {
   const auto began = std::chrono::steady_clock::now();
+  if (!options.service)
+    if (const auto offered = offer(options)) return *offered;
   mission::Prepared prepared = prepare(options);
   if (prepared.errors.empty() && options.service) prepared.errors = service_problems(prepared);
   if (!prepared.errors.empty()) return refuse(prepared.errors);
@@ -95,14 +141,17 @@ int run(const Options& options) {
     fmt::print(stderr, "repaired: {}: {}\n", repair.where, repair.what);
   for (const auto* notes : {&prepared.notes, &prepared.tasks.notes})
     for (const std::string& note : *notes) fmt::print(stderr, "note: {}\n", note);
-  const mission::RunOptions run_options{
-      .out = service ? mission::next_run_folder(options.out) : options.out,
-      .judge_cells = options.judge_cells,
-      .threads = mission::threads_or_all(options.threads),
-      .progress = options.quiet ? nullptr : &std::cerr,
-      .terminal = isatty(STDERR_FILENO) != 0,
-      .service = service ? &*service : nullptr,
-      .prepare_again = [&] { return prepare(options); }};
+  const RunPlace place = service ? service_run(options.out, prepared, *service)
+                                 : RunPlace{options.out, options.resume};
+  const mission::RunOptions run_options{.out = place.folder,
+                                        .resume = place.resume,
+                                        .skip = options.skip,
+                                        .judge_cells = options.judge_cells,
+                                        .threads = mission::threads_or_all(options.threads),
+                                        .progress = options.quiet ? nullptr : &std::cerr,
+                                        .terminal = isatty(STDERR_FILENO) != 0,
+                                        .service = service ? &*service : nullptr,
+                                        .prepare_again = [&] { return prepare(options); }};
   const bool hardware = prepared.config.robot.backend == "hardware";
   const mission::RunOutcome outcome = hardware ? mission::run_on_hardware(prepared, run_options)
                                                : mission::run_in_simulation(prepared, run_options);
@@ -124,7 +173,8 @@ int main(int argc, char** argv) {
       "  vantaged configs/missions/fort.toml --out runs/fort\n"
       "  vantaged configs/missions/any_site.toml --site path/to/folder --out runs/mine\n"
       "Exit: 0 done, 1 the mission failed (the report says how far it came), 2 refused to start,\n"
-      "3 stopped by SIGINT or SIGTERM: the robot stands, and the report says how far it came.");
+      "3 stopped by SIGINT or SIGTERM: the robot stands, and the report says how far it came,\n"
+      "4 an unfinished run is in the folder: nothing was done; --resume or --restart decides.");
   app.add_option("mission", options.mission, "Mission file (TOML)")->required();
   app.add_option("--out", options.out, "Folder for the run's products")->required();
   app.add_option("--site", options.site, "Use this site folder instead of the mission's");
@@ -134,6 +184,15 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0, 256));
   app.add_option("--judge-cells", options.judge_cells,
                  "Simulation: write the scanner positions that coverage was judged from (CSV)");
+  auto* resume =
+      app.add_flag("--resume", options.resume,
+                   "Go on with the unfinished run in --out: no station is scanned again");
+  app.add_flag("--restart", options.restart, "Remove an unfinished run in --out and begin anew")
+      ->excludes(resume);
+  app.add_option("--skip", options.skip,
+                 "With --resume: leave out this station, by its name; may be given again")
+      ->needs(resume)
+      ->allow_extra_args(false);
   app.add_flag("--quiet", options.quiet, "No progress on the terminal");
   app.add_flag("--service", options.service,
                "As a service of systemd (see vantage.service): tells it how far it is, and waits "

@@ -110,7 +110,8 @@ GuardedSurvey::GuardedSurvey(const Prepared& prepared, int threads, Config confi
                [&drivers = parts.drivers] { return drivers.complaints(); },
                parts.drivers.obstacles()},
       survey_(prepared.config, prepared.site.map, prepared.tasks, threads,
-              {parts.clock, devices_, parts.store, parts.progress, parts.compute}) {
+              {parts.clock, devices_, parts.store, parts.progress, parts.compute, parts.journal,
+               parts.past, parts.skip}) {
   gate_.watch_surroundings([this] {
     Surroundings around = survey_.surroundings();
     around.hold_fault = watch_.hold_fault();
@@ -125,7 +126,12 @@ DeviceWatch::Config GuardedSurvey::watched(DeviceWatch::Config config) {
 
 GatedDrive::Config GuardedSurvey::gated(const RobotConfig& robot) {
   GatedDrive::Config config = gate_config(robot, parts_.drivers);
-  config.tell = [this](const std::string& what) { watch_.note(what); };
+  config.tell = [this](const std::string& what) {
+    watch_.note(what);
+    if (parts_.journal == nullptr) return;
+    EventText event = stopped_event(what);
+    parts_.journal->tell(std::move(event.kind), std::move(event.text));
+  };
   config.how_to_release = config_.how_to_release;
   config.boot = config_.boot;
   config.starts_held = config_.starts_held;
@@ -211,7 +217,8 @@ void GuardedSurvey::on_devices_end(std::exception_ptr error) {
 }
 
 RunOutcome run_on_hardware(Prepared& prepared, const RunOptions& options) {
-  RunStore store = RunStore::open(options.out).value();
+  OpenedRun run = open_run(prepared, options);
+  RunStore& store = run.store;
   std::ostream none(nullptr);
   std::ostream& out = options.progress ? *options.progress : none;
   const std::unique_ptr<ProgressPrinter> printer =
@@ -230,6 +237,7 @@ RunOutcome run_on_hardware(Prepared& prepared, const RunOptions& options) {
   if (options.service != nullptr)
     serving.emplace(*options.service, prepared, options.prepare_again, io);
   Worker worker(serving ? serving->worker() : Worker::Config{});
+  Journal journal(std::move(run.journal), clock, worker);
   GuardedSurvey::Config config;
   if (serving) serving->configure(config);
   config.watch.link_troubles = [&links](std::string_view role) { return links.troubles(role); };
@@ -245,7 +253,8 @@ RunOutcome run_on_hardware(Prepared& prepared, const RunOptions& options) {
     if (consoles) consoles->hub().tell(what);
   };
   GuardedSurvey guarded(prepared, options.threads, config,
-                        {io, clock, drivers, store, progress, worker});
+                        {io, clock, drivers, store, progress, worker, &journal,
+                         run.past ? &*run.past : nullptr, options.skip});
   const Signals signals(io, guarded, options.service);
   Worker passwords;  // Planning must not keep anybody from logging in.
   if (has_console)
@@ -261,8 +270,10 @@ RunOutcome run_on_hardware(Prepared& prepared, const RunOptions& options) {
   progress.finish();
   RunRecord& record = guarded.survey().record();
   note_run(record, prepared, guarded.watch());
-  save_products(store, guarded.survey());
-  return {std::move(record), store.report_path(), guarded.failure(),
+  std::string failure = guarded.failure();
+  if (std::string unsaved = save_products(store, guarded.survey(), journal); !unsaved.empty())
+    failure += (failure.empty() ? "" : "; ") + unsaved;
+  return {std::move(record), store.report_path(), std::move(failure),
           !guarded.stop_reason().empty()};
 }
 

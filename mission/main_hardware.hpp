@@ -32,6 +32,9 @@ class GuardedSurvey {
     RunStore& store;
     ProgressPrinter& progress;
     hal::Compute& compute;
+    Journal* journal = nullptr;  // As Survey::Parts.
+    const RunHistory* past = nullptr;
+    std::vector<std::string> skip = {};
   };
   // Everything must outlive it.
   GuardedSurvey(const Prepared& prepared, int threads, Config config, Parts parts);

@@ -6,8 +6,10 @@
 #include <ostream>
 #include <thread>
 
+#include "mission/disk_fault.hpp"
 #include "mission/main_links.hpp"
 #include "mission/report.hpp"
+#include "mission/resume.hpp"
 
 namespace mission {
 namespace {
@@ -69,6 +71,38 @@ std::string run_survey(SimBackend& backend, Survey& survey,
   return failure;
 }
 
+void write_event(JournalFile& journal, EventText event) {
+  std::vector<JournalEvent> one{{0, {}, std::move(event.kind), std::move(event.text)}};
+  journal.append(one).value();
+}
+
+// Why not, in one text; empty: nothing.
+std::string objections(const RunHistory& history, const std::vector<RunInput>& inputs,
+                       const RunOptions& options) {
+  if (history.finished()) return "the run in " + options.out.string() + " is finished";
+  if (!history.begun) return "no run began in " + options.out.string();
+  std::string all;
+  for (const auto& some :
+       {changed_inputs(*history.begun, inputs), unknown_stations(history, options.skip)})
+    for (const std::string& one : some) all += (all.empty() ? "" : "; ") + one;
+  return all;
+}
+
+OpenedRun go_on(const std::vector<RunInput>& inputs, const RunOptions& options) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(options.out / RunStore::kJournalName, ignored))
+    throw CannotResume("there is no run in " + options.out.string());
+  const std::filesystem::path path = options.out / RunStore::kJournalName;
+  JournalFile journal = JournalFile::open(path).value();
+  RunHistory history = read_history(journal.read().value(), path).value();
+  if (std::string why = objections(history, inputs, options); !why.empty()) throw CannotResume(why);
+  const std::optional<int> lost = verify_scans(history, options.out).value();
+  RunStore store = RunStore::go_on(options.out).value();
+  write_event(journal, event_of(RunResumed{history.why_ended(), lost}));
+  ++history.resumed;
+  return {std::move(store), std::move(journal), std::move(history)};
+}
+
 // What only real devices need.
 std::vector<ConfigError> hardware_problems(const MissionCheck& check) {
   std::vector<ConfigError> errors = link_problems(check.config);
@@ -81,10 +115,8 @@ std::vector<ConfigError> hardware_problems(const MissionCheck& check) {
   return errors;
 }
 
-}  // namespace
-
 // The products that are made once at the end; those of each scan are on disk already.
-void save_products(RunStore& store, const Survey& survey) {
+void write_products(RunStore& store, const Survey& survey, Journal& journal) {
   const SiteModel& model = survey.model();
   ProductFacts facts;
   facts.map_ot_offset_m =
@@ -98,12 +130,37 @@ void save_products(RunStore& store, const Survey& survey) {
   store.save_summary(summarise(survey.record(), facts)).value();
   store.save_report(report_html(survey.record(), facts)).value();
   store.finish().value();
+  EventText event = products_event();
+  journal.append_now(std::move(event.kind), std::move(event.text)).value();
+  if (survey.record().completed) store.remove_beams();
+}
+
+}  // namespace
+
+std::string save_products(RunStore& store, const Survey& survey, Journal& journal) {
+  try {
+    write_products(store, survey, journal);
+    return "";
+  } catch (const FileFailure& error) {
+    return fault_text(error.error());
+  }
+}
+
+OpenedRun open_run(const Prepared& prepared, const RunOptions& options) {
+  const auto inputs = run_inputs(prepared.mission_file, prepared.config).value();
+  if (options.resume) return go_on(inputs, options);
+  RunStore store = RunStore::open(options.out).value();
+  JournalFile journal = JournalFile::open(store.journal_path()).value();
+  write_event(journal,
+              event_of(RunBegun{prepared.config.name, prepared.config.robot.backend, inputs}));
+  return {std::move(store), std::move(journal), std::nullopt};
 }
 
 Prepared prepare(const std::filesystem::path& mission_file, const Overrides& overrides,
                  WorldUse use, const std::filesystem::path& model_file) {
   MissionCheck check = check_mission(mission_file, overrides);
   Prepared prepared;
+  prepared.mission_file = mission_file;
   prepared.config = check.config;
   prepared.site = std::move(check.site);
   prepared.origin = check.origin;
@@ -127,13 +184,23 @@ Prepared prepare(const std::filesystem::path& mission_file, const Overrides& ove
 
 RunOutcome run_in_simulation(Prepared& prepared, const RunOptions& options) {
   SimBackend backend(prepared.config, prepared.tasks, std::move(prepared.sim), options.threads);
-  RunStore store = RunStore::open(options.out).value();
+  OpenedRun run = open_run(prepared, options);
+  RunStore& store = run.store;
+  const RunHistory* past = run.past ? &*run.past : nullptr;
+  if (past != nullptr && past->where && past->where->truth)
+    backend.put_robot(*past->where->truth, past->where->ground_z_m);
   std::ostream none(nullptr);
   ProgressPrinter progress(options.progress ? *options.progress : none,
                            options.progress && options.terminal);
   hal::ComputeHere compute;
+  Journal journal(std::move(run.journal), backend.clock(), compute);
+  backend.on_event([&journal](const std::string& what) {
+    EventText event = stopped_event(what);
+    journal.tell(std::move(event.kind), std::move(event.text));
+  });
   Survey survey(prepared.config, prepared.site.map, prepared.tasks, options.threads,
-                {backend.clock(), backend.devices(), store, progress, compute});
+                {backend.clock(), backend.devices(), store, progress, compute, &journal, past,
+                 options.skip, [&backend] { return backend.truths(); }});
   backend.gate().watch_surroundings([&survey] { return survey.surroundings(); });
   RunRecord& record = survey.record();
   record.repairs = prepared.site.repairs;
@@ -142,7 +209,8 @@ RunOutcome run_in_simulation(Prepared& prepared, const RunOptions& options) {
   progress.finish();
   record.notes.insert(record.notes.end(), backend.events().begin(), backend.events().end());
   record.truth = backend.judge(record, survey.model(), prepared.tasks.tasks, options.judge_cells);
-  save_products(store, survey);
+  if (std::string unsaved = save_products(store, survey, journal); !unsaved.empty())
+    failure += (failure.empty() ? "" : "; ") + unsaved;
   return {std::move(record), store.report_path(), std::move(failure), false};
 }
 

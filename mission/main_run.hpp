@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <iosfwd>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,7 @@ enum class WorldUse {
 
 // Everything that must be right before anything starts or is written.
 struct Prepared {
+  std::filesystem::path mission_file;  // May be empty: none.
   MissionConfig config;
   nav::RepairedSite site;
   std::optional<GeoOrigin> origin;  // Of the site, if its map tells.
@@ -42,8 +44,10 @@ Prepared prepare(const std::filesystem::path& mission_file, const Overrides& ove
 class Service;
 
 struct RunOptions {
-  std::filesystem::path out;          // Folder for the run's products.
-  std::filesystem::path judge_cells;  // See SimBackend::judge.
+  std::filesystem::path out;           // Folder for the run's products.
+  bool resume = false;                 // Go on with the unfinished run that is in it,
+  std::vector<std::string> skip = {};  // without these of its stations.
+  std::filesystem::path judge_cells;   // See SimBackend::judge.
   int threads = 1;
   std::ostream* progress = nullptr;              // Null: says nothing.
   bool terminal = false;                         // Whether `progress` is one.
@@ -59,13 +63,30 @@ struct RunOutcome {
   bool stopped = false;  // By a signal: not for anything that went wrong.
 };
 
+// A run's folder, open, and its journal; `past` when it goes on with what lies there.
+struct OpenedRun {
+  RunStore store;
+  JournalFile journal;
+  std::optional<RunHistory> past;
+};
+// Begins a run, or goes on with one, and says so in its journal. Throws boost::system::system_error
+// when the folder cannot be used or a scan other than the last is damaged, CannotResume when there
+// is nothing to go on with, or other inputs.
+OpenedRun open_run(const Prepared& prepared, const RunOptions& options);
+
+struct CannotResume : std::runtime_error {
+  using runtime_error::runtime_error;
+};
+
 // Runs the whole mission in simulation and writes its products. Uses up prepared.sim. Throws
 // boost::system::system_error when the folder cannot be written, std::runtime_error when the robot
 // cannot stand at its start.
 RunOutcome run_in_simulation(Prepared& prepared, const RunOptions& options);
 
-// What a run is judged and reported by, whatever carried it out: writes its products.
-void save_products(RunStore& store, const Survey& survey);
+// What a run is judged and reported by, whatever carried it out: writes its products, and then
+// that they are there. Nothing else uses the journal any more. Returns what could not be written;
+// else nothing.
+std::string save_products(RunStore& store, const Survey& survey, Journal& journal);
 
 // Threads to use for 0: one a core.
 int threads_or_all(int threads);

@@ -174,7 +174,10 @@ void ServiceProgress::message(std::string_view text) {
   service_.log(text);
 }
 
-fs::path next_run_folder(const fs::path& folder) {
+namespace {
+
+// 0: none.
+int last_run(const fs::path& folder) {
   int last = 0;
   std::error_code none;
   for (const auto& entry : fs::directory_iterator(folder, none)) {
@@ -183,7 +186,18 @@ fs::path next_run_folder(const fs::path& folder) {
     const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
     if (error == std::errc() && end == name.data() + name.size()) last = std::max(last, number);
   }
-  return folder / fmt::format("{:04}", last + 1);
+  return last;
+}
+
+}  // namespace
+
+fs::path last_run_folder(const fs::path& folder) {
+  const int last = last_run(folder);
+  return last > 0 ? folder / fmt::format("{:04}", last) : fs::path();
+}
+
+fs::path next_run_folder(const fs::path& folder) {
+  return folder / fmt::format("{:04}", last_run(folder) + 1);
 }
 
 }  // namespace mission

@@ -82,7 +82,8 @@ class ServiceProgress final : public ProgressPrinter {
   std::string shown_;
 };
 
-// FOLDER/0001, FOLDER/0002, ...: the first after all that are there.
+// FOLDER/0001, FOLDER/0002, ...: the last that is there (empty: none), and the first after all.
+std::filesystem::path last_run_folder(const std::filesystem::path& folder);
 std::filesystem::path next_run_folder(const std::filesystem::path& folder);
 
 }  // namespace mission

@@ -127,10 +127,13 @@ std::vector<Eigen::Vector3d> ground_samples(const std::vector<AreaTask>& tasks) 
 }
 
 GatedDrive::Config sim_gate_config(const RobotConfig& robot, const RobotDrivers& drivers,
-                                   std::vector<std::string>& events) {
+                                   std::vector<std::string>& events,
+                                   const std::function<void(const std::string&)>& on_event) {
   GatedDrive::Config config = gate_config(robot, drivers);
-  config.tell = [&events](const std::string& what) {
-    if (events.size() < kEventsMax) events.push_back(what);  // Later ones are not kept.
+  config.tell = [&events, &on_event](const std::string& what) {
+    if (events.size() >= kEventsMax) return;  // Later ones are not kept.
+    events.push_back(what);
+    if (on_event) on_event(what);
   };
   return config;
 }
@@ -188,12 +191,24 @@ SimBackend::SimBackend(const MissionConfig& config, const SiteTasks& tasks, SimS
       threads_(threads),
       true_site_(config, tasks, std::move(site), threads),
       robot_(config.robot, kSimAnchor, config.seed, threads, true_site_.world(), clock_),
-      gate_(sim_gate_config(config.robot, robot_.drivers(), events_), clock_,
+      gate_(sim_gate_config(config.robot, robot_.drivers(), events_, on_event_), clock_,
             robot_.drivers().drive()),
       scanner_(robot_.drivers().scanner(), true_site_.world(), clock_),
       placement_(true_site_.world(), clock_),
       devices_{gate_,      robot_.drivers().imu(),          robot_.drivers().gnss(),     scanner_,
                placement_, [this] { return complaints(); }, robot_.drivers().obstacles()} {}
+
+Survey::Truths SimBackend::truths() const {
+  const sim::World& world = true_site_.world();
+  Survey::Truths truths{world.robot().pose, world.robot().ground_z_m, std::nullopt};
+  if (!world.scans().empty()) truths.scan = world.scans().back().at.pose;
+  return truths;
+}
+
+void SimBackend::put_robot(const hal::Pose2& pose, double ground_z_m) {
+  if (!true_site_.world().put_robot(pose, ground_z_m))
+    throw std::runtime_error("the robot cannot stand where the run left it");
+}
 
 std::string SimBackend::complaints() {
   const std::string gate = gate_.why(), all = robot_.drivers().complaints();
@@ -240,13 +255,14 @@ Truth SimBackend::judge(RunRecord& record, const SiteModel& model,
 void SimBackend::judge_poses(RunRecord& record, Truth& truth) const {
   double squares_m2 = 0, nees = 0;
   for (ScanRecord& scan : record.scans) {
-    // Not every scan taken is one that counts.
-    const sim::ScanTruth& at =
-        *std::ranges::find(true_site_.world().scans(), scan.stamp, &sim::ScanTruth::stamp);
-    scan.truth = at.at.pose;
+    // Not every scan taken is one that counts; those of an earlier part of the run bring it along.
+    if (!scan.truth)
+      scan.truth = std::ranges::find(true_site_.world().scans(), scan.stamp, &sim::ScanTruth::stamp)
+                       ->at.pose;
+    const hal::Pose2& at = *scan.truth;
     Eigen::Vector3d error;
-    error << scan.believed.position_m - at.at.pose.position_m,
-        hal::wrapped(scan.believed.heading_rad - at.at.pose.heading_rad);
+    error << scan.believed.position_m - at.position_m,
+        hal::wrapped(scan.believed.heading_rad - at.heading_rad);
     const double distance_m = error.head<2>().norm();
     truth.position_error_max_m = std::max(truth.position_error_max_m, distance_m);
     truth.heading_error_max_rad = std::max(truth.heading_error_max_rad, std::abs(error.z()));
@@ -254,10 +270,9 @@ void SimBackend::judge_poses(RunRecord& record, Truth& truth) const {
     if (!scan.by_hand && scan.fit.verdict != ScanVerdict::off) {
       const hal::Pose2& before = scan.fit.before;
       truth.before_error_max_m =
-          std::max(truth.before_error_max_m, (before.position_m - at.at.pose.position_m).norm());
-      truth.before_error_max_rad =
-          std::max(truth.before_error_max_rad,
-                   std::abs(hal::wrapped(before.heading_rad - at.at.pose.heading_rad)));
+          std::max(truth.before_error_max_m, (before.position_m - at.position_m).norm());
+      truth.before_error_max_rad = std::max(
+          truth.before_error_max_rad, std::abs(hal::wrapped(before.heading_rad - at.heading_rad)));
     }
     nees += error.dot(scan.covariance.ldlt().solve(error));
   }

@@ -15,6 +15,7 @@
 #include "mission/plan.hpp"
 #include "mission/record.hpp"
 #include "mission/site_model.hpp"
+#include "mission/survey.hpp"
 #include "sim/mesh.hpp"
 #include "sim/placement.hpp"
 #include "sim/scene.hpp"
@@ -70,6 +71,12 @@ class SimBackend {
   SimulatedRobot& robot() { return robot_; }
   GatedDrive& gate() { return gate_; }
   sim::World& world() { return true_site_.world(); }
+  // Where the robot really is, and where its last scan was taken.
+  Survey::Truths truths() const;
+  // Before it runs. Throws std::runtime_error when the robot cannot stand there.
+  void put_robot(const hal::Pose2& pose, double ground_z_m);
+  // Told of each of events().
+  void on_event(std::function<void(const std::string&)> tell) { on_event_ = std::move(tell); }
   // What stopped and released the robot, in words.
   const std::vector<std::string>& events() const { return events_; }
   // Starts units and drivers, and runs until done() holds. False when they ended by themselves, or
@@ -101,6 +108,7 @@ class SimBackend {
   sim::SimClock clock_{io_};
   SimulatedRobot robot_;
   std::vector<std::string> events_;
+  std::function<void(const std::string&)> on_event_;
   GatedDrive gate_;
   sim::WitnessedScanner scanner_;
   sim::SimPlacement placement_;

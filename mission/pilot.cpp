@@ -15,7 +15,6 @@ namespace {
 constexpr hal::Duration kControlPeriod = std::chrono::milliseconds(50);
 constexpr hal::Duration kHaltWait = std::chrono::seconds(2);
 constexpr double kObstacleAheadM = 0.35;  // Beyond the bumper, when something was touched.
-constexpr double kTouchedSideM = 0.6;     // Square that is closed around the spot.
 constexpr double kBackOffM = 0.5;
 // How long a drive may not obey: a cable or a restart takes less, a person at an e-stop more.
 constexpr hal::Duration kLostPatience = std::chrono::minutes(2);
@@ -65,11 +64,6 @@ std::string drive_reason(boost::system::error_code why, hal::Duration waited,
   return said.empty() ? reason : reason + " (" + said + ")";
 }
 
-// The start pose comes from survey marks or the operator's care: a few centimetres, a degree.
-Eigen::Matrix3d start_covariance() {
-  return Eigen::Vector3d{0.05 * 0.05, 0.05 * 0.05, hal::radians(1) * hal::radians(1)}.asDiagonal();
-}
-
 }  // namespace
 
 nav::ZoneConfig zone_config(const BodyConfig& body) {
@@ -107,11 +101,16 @@ double drive_time_s(const BodyConfig& body, const nav::Route& route, hal::Pose2 
   return time_s + hal::seconds(kHaltWait);
 }
 
-Pilot::Pilot(const RobotConfig& config, hal::Clock& clock, hal::Devices& devices, hal::Pose2 start)
+Eigen::Matrix3d Pilot::start_covariance() {
+  return Eigen::Vector3d{0.05 * 0.05, 0.05 * 0.05, hal::radians(1) * hal::radians(1)}.asDiagonal();
+}
+
+Pilot::Pilot(const RobotConfig& config, hal::Clock& clock, hal::Devices& devices, hal::Pose2 start,
+             const Eigen::Matrix3d& covariance)
     : config_(config),
       clock_(clock),
       devices_(devices),
-      localizer_(localizer_config(config), start, start_covariance()),
+      localizer_(localizer_config(config), start, covariance),
       alone_(localizer_),
       sensors_(clock.now()) {}
 
@@ -228,7 +227,7 @@ hal::Task<LegEnd> Pilot::drive_on(Roads& roads, hal::Pose2 goal) {
     const Eigen::Vector2d at_m = end == RouteEnd::touched ? pose().position_m : W_in_way_m_;
     met = fmt::format("; something was in the way at ({:.1f}, {:.1f}) m", at_m.x(), at_m.y());
     if (end == RouteEnd::touched)
-      co_await close_touched(roads);
+      co_await close_touched(roads, leg);
     else
       close_seen(roads, W_in_way_m_);
     if (end == RouteEnd::in_the_way) closed_for_now_at_ = clock_.now();
@@ -236,11 +235,12 @@ hal::Task<LegEnd> Pilot::drive_on(Roads& roads, hal::Pose2 goal) {
   co_return leg;
 }
 
-hal::Task<void> Pilot::close_touched(Roads& roads) {
+hal::Task<void> Pilot::close_touched(Roads& roads, LegEnd& leg) {
   const hal::Pose2 here = pose();
   const Eigen::Vector2d ahead{std::cos(here.heading_rad), std::sin(here.heading_rad)};
   co_await back_off();
-  roads.close({here.position_m + (config_.body.radius_m + kObstacleAheadM) * ahead}, kTouchedSideM);
+  leg.touched_m.emplace_back(here.position_m + (config_.body.radius_m + kObstacleAheadM) * ahead);
+  roads.close({leg.touched_m.back()}, kTouchedSideM);
 }
 
 // All that is seen around it, so that the new way does not lead along its other end at once. Walls

@@ -25,10 +25,11 @@ struct LegEnd {
   bool drive_lost{};  // It did not come back in time: nothing more can be driven.
   std::string reason;
   double driven_m{};
-  double short_of_goal_m{};              // Where it ended, as believed.
-  int obstacles_met{};                   // Ways that had something in them.
-  double waited_s{};                     // Standing before it.
-  std::vector<Eigen::Vector2d> track_m;  // Believed positions, about one per metre.
+  double short_of_goal_m{};                // Where it ended, as believed.
+  int obstacles_met{};                     // Ways that had something in them.
+  double waited_s{};                       // Standing before it.
+  std::vector<Eigen::Vector2d> track_m;    // Believed positions, about one per metre.
+  std::vector<Eigen::Vector2d> touched_m;  // Where roads were closed for good.
 };
 
 // How a robot of this body follows paths.
@@ -44,7 +45,12 @@ double drive_time_s(const BodyConfig& body, const nav::Route& route, hal::Pose2 
 
 class Pilot {
  public:
-  Pilot(const RobotConfig& config, hal::Clock& clock, hal::Devices& devices, hal::Pose2 start);
+  // Of a start pose from survey marks or the operator's care: a few centimetres, a degree.
+  static Eigen::Matrix3d start_covariance();
+  static constexpr double kTouchedSideM = 0.6;  // Square that is closed around what was touched.
+
+  Pilot(const RobotConfig& config, hal::Clock& clock, hal::Devices& devices, hal::Pose2 start,
+        const Eigen::Matrix3d& covariance = start_covariance());
 
   // Runs beside the mission and keeps the pose current, without IMU or satellites where these are
   // lost. Ends only by cancellation, or when the wheels' travel cannot be had (throws
@@ -100,7 +106,7 @@ class Pilot {
   bool has_patience(const nav::Zones& zones, Hold& hold, LegEnd& leg) const;
   RouteEnd end_of(const Hold& hold, const hal::Pose2& goal, LegEnd& leg);
   void close_seen(Roads& roads, const Eigen::Vector2d& W_in_way_m) const;
-  hal::Task<void> close_touched(Roads& roads);
+  hal::Task<void> close_touched(Roads& roads, LegEnd& leg);
   hal::Task<RouteEnd> follow_route(const nav::Route& route, hal::Pose2 goal, LegEnd& leg);
   hal::Task<boost::system::error_code> tell_drive(hal::Twist twist, LegEnd& leg);
   hal::Task<boost::system::error_code> wait_for_drive(boost::system::error_code why, LegEnd& leg);

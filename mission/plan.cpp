@@ -208,6 +208,30 @@ PlannedArea plan_area(const MissionConfig& config, const nav::SiteMap& map, cons
   return planned;
 }
 
+std::vector<int> tour_from(const Eigen::Vector2d& here_m, const AreaPlan& plan,
+                           const std::vector<int>& stations, const nav::Roadmap& roadmap,
+                           const std::optional<Eigen::Vector2d>& home_m) {
+  std::vector<Eigen::Vector2d> stops_m{here_m};
+  for (const int s : stations)
+    stops_m.push_back(nav::to_m(plan.cover.stations[static_cast<std::size_t>(s)].at.position));
+  if (home_m) stops_m.push_back(*home_m);
+  planning::TourProblem problem{
+      .cost = road_lengths(roadmap, stops_m), .start = 0, .closed = home_m.has_value()};
+  if (home_m) {  // Who comes back to the start has come home.
+    for (auto& row : problem.cost) {
+      row.front() = row.back();
+      row.pop_back();
+    }
+    problem.cost.pop_back();
+  }
+  const planning::Tour tour = planning::solve_tour(problem);
+  std::vector<int> order;
+  for (const auto* stops : {&tour.order, &tour.unreachable})
+    for (const int stop : *stops)
+      if (stop > 0) order.push_back(stations[static_cast<std::size_t>(stop - 1)]);
+  return order;
+}
+
 std::vector<PlannedArea> plan_areas(const MissionConfig& config, const nav::SiteMap& map,
                                     const SiteTasks& tasks, int threads) {
   std::vector<PlannedArea> areas;

@@ -59,4 +59,10 @@ std::string station_name(const AreaPlan& plan, int station);
 std::vector<PlannedArea> plan_areas(const MissionConfig& config, const nav::SiteMap& map,
                                     const SiteTasks& tasks, int threads);
 
+// The same stations, so that the way from here to all of them, and home if there is one, is the
+// shortest; those that no road leads to come last.
+std::vector<int> tour_from(const Eigen::Vector2d& here_m, const AreaPlan& plan,
+                           const std::vector<int>& stations, const nav::Roadmap& roadmap,
+                           const std::optional<Eigen::Vector2d>& home_m);
+
 }  // namespace mission

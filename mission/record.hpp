@@ -201,6 +201,7 @@ struct RunRecord {
   GnssCounts gnss;
   RegistrationCounts registration;
   double mission_s{};
+  int resumed{};  // How often it went on after it had ended or been cut off.
   double driven_total_m{};
   MovingFacts moving;
   EnergyFacts energy;

@@ -416,4 +416,56 @@ TourFit ScanRegistrar::close() {
   return tour;
 }
 
+void RegistrarChange::apply(RegistrarState& state) const {
+  state.scans.push_back(scan);
+  state.links.insert(state.links.end(), links.begin(), links.end());
+  state.tried.insert(state.tried.end(), tried.begin(), tried.end());
+}
+
+RegistrarState ScanRegistrar::state() const {
+  RegistrarState state;
+  for (const Scan& scan : scans_)
+    state.scans.push_back(
+        {scan.number, scan.T_W_S, scan.cloud != nullptr, scan.prior.T_W_S, scan.prior.covariance});
+  for (const nav::PoseLink& link : links_)
+    state.links.push_back({link.from, link.to, link.T_from_to, link.covariance});
+  state.tried.assign(tried_.begin(), tried_.end());
+  return state;
+}
+
+RegistrarChange ScanRegistrar::last_kept() const {
+  const Scan& last = scans_.back();
+  RegistrarChange change{
+      {last.number, last.T_W_S, last.cloud != nullptr, last.prior.T_W_S, last.prior.covariance},
+      {},
+      {}};
+  const int self = static_cast<int>(scans_.size()) - 1;
+  for (const nav::PoseLink& link : links_)
+    if (link.to == self)
+      change.links.push_back({link.from, link.to, link.T_from_to, link.covariance});
+  for (const auto& pair : tried_)
+    if (pair.first == last.number || pair.second == last.number) change.tried.push_back(pair);
+  return change;
+}
+
+void ScanRegistrar::take_up(
+    const RegistrarState& state,
+    const std::function<std::vector<Eigen::Vector3f>(int number)>& S_points_m) {
+  scans_.clear();
+  links_.clear();
+  tried_ = {state.tried.begin(), state.tried.end()};
+  for (const RegistrarLink& link : state.links)
+    links_.push_back({link.from, link.to, link.T_from_to, link.covariance});
+  auto too_many = std::ranges::count(state.scans, true, &RegistrarScan::in_hand) -
+                  std::ptrdiff_t{config_.in_hand_max};
+  for (const RegistrarScan& scan : state.scans) {
+    const int self = static_cast<int>(scans_.size());
+    scans_.push_back(
+        {scan.number, scan.T_W_S, {self, scan.prior_T_W_S, scan.prior_covariance}, nullptr});
+    if (!scan.in_hand || too_many-- > 0) continue;
+    take(S_points_m(scan.number));
+    scans_.back().cloud = std::move(taken_);
+  }
+}
+
 }  // namespace mission

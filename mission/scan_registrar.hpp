@@ -6,6 +6,7 @@
 // from bending them.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <set>
 #include <utility>
@@ -60,6 +61,33 @@ struct TourFit {
   bool settled{};
 };
 
+// What a registrar keeps of its scans, but for their points: see ScanRegistrar::state.
+struct RegistrarScan {
+  int number{};
+  Eigen::Isometry3d T_W_S = Eigen::Isometry3d::Identity();
+  bool in_hand{};
+  Eigen::Isometry3d prior_T_W_S = Eigen::Isometry3d::Identity();
+  nav::Matrix6d prior_covariance = nav::Matrix6d::Identity();
+};
+struct RegistrarLink {
+  int from{}, to{};  // By their place among the scans.
+  Eigen::Isometry3d T_from_to = Eigen::Isometry3d::Identity();
+  nav::Matrix6d covariance = nav::Matrix6d::Identity();
+};
+struct RegistrarState {
+  std::vector<RegistrarScan> scans;
+  std::vector<RegistrarLink> links;
+  std::vector<std::pair<int, int>> tried;  // Pairs of numbers, the lower first, ascending.
+};
+// What keep() added to it.
+struct RegistrarChange {
+  RegistrarScan scan;
+  std::vector<RegistrarLink> links;
+  std::vector<std::pair<int, int>> tried;
+
+  void apply(RegistrarState& state) const;
+};
+
 class ScanRegistrar {
  public:
   ScanRegistrar(const RegisterConfig& config, const ScannerConfig& scanner, int threads);
@@ -78,6 +106,14 @@ class ScanRegistrar {
   TourFit close();
 
   std::size_t in_hand() const;
+
+  // All but the points, and what the last keep() added.
+  RegistrarState state() const;
+  RegistrarChange last_kept() const;
+  // In place of what it has: exactly as another was. S_points_m tells the points of a scan in hand;
+  // of those only the last [register] in_hand_max are in hand.
+  void take_up(const RegistrarState& state,
+               const std::function<std::vector<Eigen::Vector3f>(int number)>& S_points_m);
 
  private:
   struct Scan;

@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <utility>
 
+#include "mission/beams_file.hpp"
 #include "mission/json_text.hpp"
 
 namespace mission {
@@ -30,33 +31,51 @@ FileError refused(const fs::path& folder, std::string why) {
 }
 
 // 0001.ply, or what was left of it when the power went: .0001.ply.part
-bool is_scan_name(std::string name) {
+bool is_scan_name(std::string name, std::string_view ending) {
   if (name.starts_with('.') && name.ends_with(".part")) name = name.substr(1, name.size() - 6);
-  if (!name.ends_with(".ply") || name.size() < 8) return false;
-  return std::all_of(name.begin(), name.end() - 4,
+  if (!name.ends_with(ending) || name.size() < ending.size() + 4) return false;
+  return std::all_of(name.begin(), name.end() - static_cast<std::ptrdiff_t>(ending.size()),
                      [](unsigned char c) { return std::isdigit(c) != 0; });
 }
 
-// Everything an earlier run of ours left in the folder, in the order to remove it.
-std::vector<fs::path> products_in(const fs::path& folder) {
+std::vector<fs::path> scans_in(const fs::path& folder, std::string_view ending) {
+  std::vector<fs::path> scans;
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(folder / "scans", none))
+    if (is_scan_name(entry.path().filename().string(), ending)) scans.push_back(entry.path());
+  std::ranges::sort(scans);
+  return scans;
+}
+
+// What the end of a run leaves, in the order to remove it.
+std::vector<fs::path> ends_in(const fs::path& folder) {
   std::vector<fs::path> products;
   for (const std::string_view name : kProducts) {
     products.push_back(folder / name);
     products.push_back(part_name(folder / name));
   }
-  std::error_code none;
-  for (const auto& entry : fs::directory_iterator(folder / "scans", none)) {
-    if (is_scan_name(entry.path().filename().string())) products.push_back(entry.path());
-  }
   return products;
 }
 
-FileResult<bool> remove_products(const fs::path& folder) {
+// Everything an earlier run of ours left in the folder, in the order to remove it: the journal
+// before what it vouches for, and its log before the journal, so that what is left of it is true.
+std::vector<fs::path> products_in(const fs::path& folder) {
+  std::vector<fs::path> products = ends_in(folder);
+  const fs::path journal = folder / RunStore::kJournalName;
+  for (const char* ending : {"-wal", "-journal", ""})
+    products.emplace_back(journal.string() + ending);
+  for (const std::string_view ending : {".beams", ".ply"})
+    for (fs::path& scan : scans_in(folder, ending)) products.push_back(std::move(scan));
+  return products;
+}
+
+FileResult<bool> remove_all(const std::vector<fs::path>& files) {
   bool any = false;
-  for (const fs::path& product : products_in(folder)) {
-    std::error_code error;
-    any = fs::remove(product, error) || any;
-    if (error) return FileError{product, "remove", error};
+  for (const fs::path& file : files) {
+    if (file_calls().unlink(file.c_str()) == 0)
+      any = true;
+    else if (errno != ENOENT)
+      return failed(file, "remove");
   }
   return any;
 }
@@ -84,16 +103,44 @@ FileResult<RunStore> RunStore::open(const fs::path& folder) {
   store.folder_ = folder;
   const fs::path decisions = folder / kDecisions;
   const bool earlier = fs::exists(decisions, error);
-  store.decisions_fd_ = ::open(decisions.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
-  if (store.decisions_fd_ < 0) return failed(decisions, "write");
-  if (::flock(store.decisions_fd_, LOCK_EX | LOCK_NB) != 0) {
-    return refused(folder, "another process is writing a run into it; name another folder");
-  }
-  const auto removed = remove_products(folder);
+  if (const auto locked = store.lock(); !locked) return locked.error();
+  const auto removed = remove_all(products_in(folder));
   if (!removed) return removed.error();
-  if (::ftruncate(store.decisions_fd_, 0) != 0) return failed(decisions, "empty");
+  if (file_calls().ftruncate(store.decisions_fd_, 0) != 0) return failed(decisions, "empty");
   store.replaced_ = earlier || *removed;
   return store;
+}
+
+FileResult<RunStore> RunStore::go_on(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::exists(folder / kJournalName, error)) return refused(folder, "no run is in it");
+  RunStore store;
+  store.folder_ = folder;
+  if (const auto locked = store.lock(); !locked) return locked.error();
+  if (const auto removed = remove_all(ends_in(folder)); !removed) return removed.error();
+  if (const auto cut = store.cut_decisions(); !cut) return cut.error();
+  return store;
+}
+
+FileResult<void> RunStore::lock() {
+  const fs::path decisions = folder_ / kDecisions;
+  decisions_fd_ =
+      file_calls().open(decisions.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+  if (decisions_fd_ < 0) return failed(decisions, "write");
+  if (::flock(decisions_fd_, LOCK_EX | LOCK_NB) != 0)
+    return refused(folder_, "another process is writing a run into it; name another folder");
+  return {};
+}
+
+// After a cut the last line may be a part of one.
+FileResult<void> RunStore::cut_decisions() {
+  const auto text = read_file(folder_ / kDecisions);
+  if (!text) return text.error();
+  const std::size_t whole = text->rfind('\n') + 1;  // 0 where there is none.
+  if (whole == text->size()) return {};
+  if (file_calls().ftruncate(decisions_fd_, static_cast<std::int64_t>(whole)) != 0)
+    return failed(folder_ / kDecisions, "shorten");
+  return {};
 }
 
 RunStore::RunStore(RunStore&& other) noexcept
@@ -116,16 +163,22 @@ fs::path RunStore::scan_path(int number) const {
   return folder_ / "scans" / fmt::format("{:04}.ply", number);
 }
 
+fs::path RunStore::beams_path(int number) const {
+  return folder_ / "scans" / fmt::format("{:04}.beams", number);
+}
+
 FileResult<void> RunStore::decide(const boost::json::object& decision) {
-  const std::string line = json_line(decision) + "\n";
-  std::string_view left = line;
-  while (!left.empty()) {
-    const ssize_t wrote = ::write(decisions_fd_, left.data(), left.size());
-    if (wrote < 0 && errno == EINTR) continue;
-    if (wrote < 0) return failed(folder_ / kDecisions, "write");
-    left.remove_prefix(static_cast<std::size_t>(wrote));
-  }
+  if (!write_fully(decisions_fd_, json_line(decision) + "\n"))
+    return failed(folder_ / kDecisions, "write");
   return {};
+}
+
+FileResult<std::uint64_t> RunStore::save_beams(int number, const hal::ScanCloud& scan) {
+  return write_beams(beams_path(number), scan);
+}
+
+FileResult<hal::ScanCloud> RunStore::beams(int number, std::uint64_t checksum) const {
+  return read_beams(beams_path(number), checksum);
 }
 
 FileResult<void> RunStore::save_scan(const std::vector<Eigen::Vector3f>& W_points_m,
@@ -152,8 +205,22 @@ FileResult<void> RunStore::save_report(std::string_view html) {
 }
 
 FileResult<void> RunStore::finish() {
-  if (::fsync(decisions_fd_) != 0) return failed(folder_ / kDecisions, "write");
+  if (file_calls().fsync(decisions_fd_) != 0) return failed(folder_ / kDecisions, "write");
   return {};
+}
+
+// One that stays does no harm.
+void RunStore::remove_beams() {
+  (void)remove_all(scans_in(folder_, ".beams"));
+}
+
+FileResult<void> RunStore::has_room(std::uint64_t bytes) const {
+  const std::int64_t free = file_calls().bytes_free(folder_.c_str());
+  if (free < 0 || static_cast<std::uint64_t>(free) >= bytes) return {};
+  return FileError{
+      folder_, "write another scan into", make_error_code(boost::system::errc::no_space_on_device),
+      fmt::format("the disk is almost full: {} MB are free and {} MB are needed; make room",
+                  free / 1'000'000, bytes / 1'000'000)};
 }
 
 }  // namespace mission

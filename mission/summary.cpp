@@ -285,6 +285,7 @@ json::object summarise(const RunRecord& record, const ProductFacts& products) {
                        {"completed", record.completed},
                        {"end", record.end},
                        {"mission_s", mm(record.mission_s)},
+                       {"resumed", record.resumed},
                        {"driven_m", mm(record.driven_total_m)},
                        {"voxel_m", record.voxel_m},
                        {"gain_min_voxels", record.gain_min_voxels},

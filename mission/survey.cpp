@@ -5,6 +5,7 @@
 #include <boost/system/system_error.hpp>
 
 #include "hal/together.hpp"
+#include "mission/disk_fault.hpp"
 #include "mission/json_text.hpp"
 
 namespace mission {
@@ -13,18 +14,40 @@ namespace {
 namespace json = boost::json;
 namespace errc = boost::system::errc;
 
-constexpr int kScanTries = 3;  // At a stop,
+constexpr std::uint64_t kScansOfRoom = 2;  // Must be free on the disk before one is taken.
+constexpr int kScanTries = 3;              // At a stop,
 constexpr hal::Duration kScanPause = std::chrono::seconds(5);
 constexpr int kStopsWithoutScan = 2;  // and so many stops in a row: then no scanner is left.
-
-// The survey cannot go on; what() says why, in words for the operator.
-struct CannotGoOn : std::runtime_error {
-  using runtime_error::runtime_error;
-};
+// How far a robot may be from where it was last known to be on its way, and turned (1-sigma).
+constexpr double kCutOffM = 2.0, kCutOffRad = 0.35;
 
 // Trying again cannot help: the robot file asks for what the devices do not do.
 bool is_hopeless(boost::system::error_code error) {
   return error == errc::invalid_argument || error == errc::argument_out_of_domain;
+}
+
+// Where it stands when it begins.
+hal::Pose2 start_pose(const SiteTasks& tasks, const RunHistory* past) {
+  return past != nullptr && past->where ? past->where->believed : tasks.start;
+}
+
+// A robot that was cut off on its way rolled on a little, and stands somewhere ahead.
+Eigen::Matrix3d start_covariance(const RunHistory* past) {
+  Eigen::Matrix3d covariance = Pilot::start_covariance();
+  if (past == nullptr || !past->where) return covariance;
+  covariance += past->where->covariance;
+  const Eigen::Vector3d cut_off{kCutOffM, kCutOffM, kCutOffRad};
+  if (past->left) covariance += Eigen::Matrix3d(cut_off.cwiseAbs2().asDiagonal());
+  return covariance;
+}
+
+// Of what is kept of one: what was measured, and its points in W.
+std::uint64_t scan_bytes(const ScannerConfig& scanner) {
+  constexpr double kBeamBytes = 28, kPointBytes = 12;
+  const double columns = scanner.fov_deg / scanner.azimuth_step_deg + 1;
+  const double rows =
+      (scanner.elevation_max_deg - scanner.elevation_min_deg) / scanner.elevation_step_deg + 1;
+  return static_cast<std::uint64_t>(columns * rows * (kBeamBytes + kPointBytes));
 }
 
 json::object plan_json(const AreaPlan& plan) {
@@ -60,12 +83,12 @@ Survey::Survey(const MissionConfig& config, const nav::SiteMap& map, SiteTasks t
       parts_(parts),
       began_(parts.clock.now()),
       orders_(parts.clock),
-      pilot_(config.robot, parts.clock, parts.devices, tasks_.start),
+      pilot_(config.robot, parts.clock, parts.devices, start_pose(tasks_, parts.past),
+             start_covariance(parts.past)),
       model_(std::make_unique<SiteModel>(config, map, tasks_.tasks, threads)),
       matcher_(config.localize.match_map ? std::make_unique<MapMatcher>(map, config.robot.scanner)
                                          : nullptr),
       registrar_(config.registration, config.robot.scanner, threads),
-      spool_(ScanSpool::open(parts.store.folder()).value()),
       energy_(config.robot.battery, config.robot.scanner.scan_s) {
   record_.mission = config.name;
   record_.site = map.name;
@@ -90,10 +113,13 @@ hal::Task<void> Survey::run() {
   orders_.begin(tasks_.start_area >= 0);
   try {
     // The survey decides when it is over; the pilot only keeps it company.
-    co_await hal::first_of(survey(), pilot_.track());
+    co_await hal::first_of(survey(), beside());
   } catch (const CannotGoOn& why) {
     record_.end = why.what();
     failure = std::current_exception();
+  } catch (const FileFailure& error) {
+    record_.end = stop_reason_.empty() ? fault_text(error.error()) : stop_reason_;
+    failure = std::make_exception_ptr(CannotGoOn(record_.end));
   } catch (const boost::system::system_error& error) {
     record_.end =
         stop_reason_.empty() ? fmt::format("a device failed: {}", error.what()) : stop_reason_;
@@ -110,15 +136,34 @@ hal::Task<void> Survey::run() {
   record_.set_aside = model_->voxels_set_aside();
   record_.thin_set_aside = model_->thin_set_aside();
   record_.foliage = model_->foliage();
-  decide({{"t_s", now_s()},
-          {"decision", "end"},
-          {"completed", record_.completed},
-          {"reason", record_.end}});
+  note_end();
   if (failure) std::rethrow_exception(failure);
+}
+
+// On a disk that is full or gone the record alone says it.
+void Survey::note_end() {
+  const auto decided = parts_.store.decide({{"t_s", now_s()},
+                                            {"decision", "end"},
+                                            {"completed", record_.completed},
+                                            {"reason", record_.end}});
+  if (!decided) record_.notes.push_back("its end is no decision: " + decided.error().text());
+  keep_end();
+}
+
+// What lives with the survey: the pilot keeps the pose, and the journal is written.
+hal::Task<void> Survey::beside() {
+  std::vector<hal::Task<void>> all;
+  all.push_back(pilot_.track());
+  if (parts_.journal != nullptr) all.push_back(parts_.journal->run());
+  co_await hal::together(std::move(all));
 }
 
 hal::Task<void> Survey::survey() {
   co_await plan_stations();
+  if (parts_.past != nullptr)
+    co_await take_up();
+  else
+    co_await keep_plan();
   bool ordered_home = false;
   try {
     co_await look_around();
@@ -222,11 +267,12 @@ void Survey::take_plans(std::vector<PlannedArea> all) {
     record_.plans.push_back(std::move(planned.plan));
     roads_.push_back(std::move(planned.roads));
   }
+  dealt_with_.resize(record_.plans.size());
 }
 
 hal::Task<void> Survey::tour(std::size_t t) {
   const AreaPlan& plan = record_.plans[t];
-  for (std::size_t at = 0; at < plan.tour.size();) {
+  for (std::size_t& at = dealt_with_[t]; at < plan.tour.size();) {
     const int s = plan.tour[at];
     const planning::Station& station = plan.cover.stations[static_cast<std::size_t>(s)];
     // Named: GCC 12 destroys an aggregate made inside a co_await expression twice.
@@ -235,7 +281,10 @@ hal::Task<void> Survey::tour(std::size_t t) {
                     .pose = pose_of(station.at),
                     .station = &station,
                     .view = nullptr};
-    co_await visit(stop);
+    if (std::ranges::count(parts_.skip, stop.name) > 0)
+      drop(stop, "skipped, as the operator asked");
+    else
+      co_await visit(stop);
     if (std::exchange(put_off_, false)) {
       co_await retour(t, at);
       continue;
@@ -340,8 +389,9 @@ hal::Task<bool> Survey::drive(const Stop& stop, ScanRecord& scan) {
     co_return false;
   }
   const double began_s = now_s();
-  const LegEnd leg =
-      co_await pilot_.drive_to(roads_[static_cast<std::size_t>(stop.task)], stop.pose);
+  LegEnd leg;
+  tell(leaves_event(stop.name));
+  co_await hal::first_of(follow(stop, leg), tell_places());
   energy_.drove(now_s() - began_s);
   scan.driven_m = leg.driven_m;
   record_.driven_total_m += leg.driven_m;
@@ -356,6 +406,7 @@ hal::Task<bool> Survey::drive(const Stop& stop, ScanRecord& scan) {
           {"obstacles_met", leg.obstacles_met},
           {"waited_s", leg.waited_s},
           {"reason", leg.reason}});
+  tell_leg(stop, leg);
   if (leg.drive_lost) throw CannotGoOn(fmt::format("on the way to {}: {}", stop.name, leg.reason));
   if (!leg.arrived) drop(stop, leg.reason);
   co_return leg.arrived;
@@ -388,6 +439,7 @@ hal::Task<bool> Survey::carry(const Stop& stop, ScanRecord& scan) {
 hal::Task<bool> Survey::acquire(const Stop& stop, ScanRecord scan) {
   scan.number = static_cast<int>(record_.scans.size()) + 1;
   scan.start_s = now_s();
+  parts_.store.has_room(kScansOfRoom * scan_bytes(config_.robot.scanner)).value();
   const int takes = config_.registration.scans && config_.registration.retake ? 2 : 1;
   for (int take = 1;; ++take) {
     const double began_s = now_s();
@@ -412,6 +464,7 @@ hal::Task<bool> Survey::acquire(const Stop& stop, ScanRecord scan) {
     tell_localizer(scan);
     const std::function<void()> work = [&] { merge(*cloud, stop, scan); };
     co_await parts_.compute.run(work);
+    co_await keep_scan(stop);
     co_return true;
   }
 }
@@ -446,6 +499,8 @@ void Survey::merge(const hal::ScanCloud& cloud, const Stop& stop, ScanRecord& sc
       scanner_pose(scan.believed, scan.ground_z_m, config_.robot.scanner.height_m);
   const std::vector<Eigen::Vector3f> W_points_m = scan_points(cloud, T_W_S);
   // Durable before it counts.
+  if (keeps_beams())
+    beams_checksums_.push_back(parts_.store.save_beams(scan.number, cloud).value());
   parts_.store
       .save_scan(
           W_points_m, T_W_S,
@@ -482,7 +537,6 @@ void Survey::merge(const hal::ScanCloud& cloud, const Stop& stop, ScanRecord& sc
 ScanEffect Survey::insert(const hal::ScanCloud& cloud,
                           const std::vector<Eigen::Vector3f>& W_points_m,
                           const Eigen::Isometry3d& T_W_S, const Stop& stop, ScanRecord& scan) {
-  if (config_.registration.scans && config_.registration.tour_end) spool_.put(cloud).value();
   cloud_.add(W_points_m);
   if (stop.view) {
     model_->expect(*stop.view);
@@ -507,6 +561,7 @@ void Survey::drop(const Stop& stop, const std::string& reason) {
           {"name", stop.name},
           {"at", exact_json(stop.pose)},
           {"reason", reason}});
+  tell_drop(stop);
 }
 
 void Survey::decide(const json::object& decision) {

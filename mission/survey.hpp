@@ -2,6 +2,7 @@
 // best views until none would add enough.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -19,8 +20,8 @@
 #include "mission/ply.hpp"
 #include "mission/progress.hpp"
 #include "mission/record.hpp"
+#include "mission/run_history.hpp"
 #include "mission/scan_registrar.hpp"
-#include "mission/scan_spool.hpp"
 #include "mission/site_model.hpp"
 #include "mission/store.hpp"
 #include "mission/surroundings.hpp"
@@ -28,15 +29,30 @@
 
 namespace mission {
 
+// The survey cannot go on; what() says why, in words for the operator.
+struct CannotGoOn : std::runtime_error {
+  using runtime_error::runtime_error;
+};
+
 class Survey {
  public:
+  // In simulation: where the robot really is, and where its last scan was really taken.
+  struct Truths {
+    hal::Pose2 robot;
+    double ground_z_m{};
+    std::optional<hal::Pose2> scan;
+  };
   // What a survey needs; everything outlives it.
   struct Parts {
     hal::Clock& clock;
     hal::Devices& devices;
     RunStore& store;
     ProgressPrinter& progress;
-    hal::Compute& compute;  // Plans, while the robot stands and its devices are served.
+    hal::Compute& compute;             // Plans, while the robot stands and its devices are served.
+    Journal* journal = nullptr;        // Null: nobody can go on with it after a cut.
+    const RunHistory* past = nullptr;  // The run to go on with; null: a new one.
+    std::vector<std::string> skip = {};  // Stations to be left out, by name.
+    std::function<Truths()> truths = {};
   };
 
   Survey(const MissionConfig& config, const nav::SiteMap& map, SiteTasks tasks, int threads,
@@ -72,12 +88,38 @@ class Survey {
 
   hal::Task<void> survey();
   hal::Task<void> look_around();
+  hal::Task<void> beside();
   hal::Task<void> plan_stations();
   void take_plans(std::vector<PlannedArea> planned);
   hal::Task<void> tour(std::size_t task);
   hal::Task<void> refine();
   hal::Task<void> go_home(bool ordered);
   std::string why_no_scan() const;
+  // In survey_journal.cpp.
+  hal::Task<void> keep(EventText event);
+  void tell(EventText event);
+  hal::Task<void> keep_plan();
+  hal::Task<void> keep_scan(const Stop& stop);
+  hal::Task<void> keep_closing(bool moved);
+  void tell_leg(const Stop& stop, const LegEnd& leg);
+  void tell_drop(const Stop& stop);
+  hal::Task<void> tell_places();
+  hal::Task<void> follow(const Stop& stop, LegEnd& leg);
+  void keep_end();
+  void note_end();
+  RunPlanned planned() const;
+  SoFar so_far() const;
+  Whereabouts whereabouts() const;
+  // In survey_resume.cpp.
+  hal::Task<void> take_up();
+  void redo();
+  void redo(const LegDone& leg);
+  void redo(const ScanDone& done);
+  void redo(const TourClosed& closed);
+  void redo(const StationDropped& dropped);
+  void mend_scans();
+  void tour_the_rest();
+  bool keeps_beams() const;
   void note_box();
   void note_gnss();
   void note_moving();
@@ -120,10 +162,11 @@ class Survey {
                      MapSays map, bool last);
   void try_to_register(const ScanBelief& belief, ScanRecord& scan, bool other_guesses);
   void tell_localizer(const ScanRecord& scan);
+  static std::string refused_note(const ScanRecord& scan);
   void note_verdict(const ScanRecord& scan, bool again);
   hal::Task<void> close_tour();
   bool fit_tour();
-  void fill_anew();
+  void fill_anew(bool save);
   void note_registration();
 
   std::vector<NextView> choose_views();
@@ -136,7 +179,7 @@ class Survey {
   void close_roads(const std::vector<Eigen::Vector2d>& obstacles_m);
   void decide(const boost::json::object& decision);
   void show(const Stop& stop);
-  double now_s() const { return hal::seconds(parts_.clock.now() - began_); }
+  double now_s() const { return before_s_ + hal::seconds(parts_.clock.now() - began_); }
   const AreaTask& task(int index) const { return tasks_.tasks[static_cast<std::size_t>(index)]; }
 
   const MissionConfig config_;
@@ -145,19 +188,21 @@ class Survey {
   const int threads_;
   Parts parts_;
   const hal::Time began_;
+  double before_s_{};  // Mission time of what went before, when it goes on with a run.
   std::string stop_reason_;
   SurveyOrders orders_;
   Pilot pilot_;
   std::unique_ptr<SiteModel> model_;
   std::unique_ptr<MapMatcher> matcher_;  // Null: not asked for.
   ScanRegistrar registrar_;
-  ScanAttempt attempt_;          // Of the scan that is being registered.
-  ScanSpool spool_;              // Of the scans merged.
-  int scans_closed_{};           // In the map as the last closed tour has them.
-  int last_by_robot_ = -1;       // Index of a scan,
-  double last_by_robot_at_m_{};  // and the way travelled until then.
-  int layers_at_first_{};        // Of its voxel box.
-  std::vector<Roads> roads_;     // One per planned task, in order.
+  ScanAttempt attempt_;                         // Of the scan that is being registered.
+  std::vector<std::uint64_t> beams_checksums_;  // Of the scans kept, where keeps_beams().
+  int scans_closed_{};                          // In the map as the last closed tour has them.
+  int last_by_robot_ = -1;                      // Index of a scan,
+  double last_by_robot_at_m_{};                 // and the way travelled until then.
+  int layers_at_first_{};                       // Of its voxel box.
+  std::vector<Roads> roads_;                    // One per planned task, in order.
+  std::vector<std::size_t> dealt_with_;         // Stations of each planned task's tour.
   std::size_t stations_planned_{};
   std::size_t stations_done_{};
   int views_taken_{};

@@ -176,6 +176,11 @@ void Survey::tell_localizer(const ScanRecord& scan) {
   if (done.gate == nav::Gate::rejected) ++record_.registration.unheard;
 }
 
+std::string Survey::refused_note(const ScanRecord& scan) {
+  return fmt::format("scan {} ({}) contradicts the scans that it overlaps and was not merged: {}",
+                     scan.number, scan.name, scan.fit.reason);
+}
+
 void Survey::note_verdict(const ScanRecord& scan, bool again) {
   RegistrationCounts& counts = record_.registration;
   if (again) {
@@ -191,10 +196,7 @@ void Survey::note_verdict(const ScanRecord& scan, bool again) {
   counts.held_in_part += scan.fit.verdict == ScanVerdict::held_in_part;
   counts.alone += scan.fit.verdict == ScanVerdict::alone;
   counts.refused += scan.fit.verdict == ScanVerdict::refused;
-  if (scan.fit.verdict == ScanVerdict::refused)
-    record_.notes.push_back(
-        fmt::format("scan {} ({}) contradicts the scans that it overlaps and was not merged: {}",
-                    scan.number, scan.name, scan.fit.reason));
+  if (scan.fit.verdict == ScanVerdict::refused) record_.notes.push_back(refused_note(scan));
 }
 
 // All pairs that overlap together; where that moves any pose, the map is filled anew.
@@ -205,9 +207,10 @@ hal::Task<void> Survey::close_tour() {
   bool moved = false;
   const std::function<void()> close = [&] {
     moved = fit_tour();
-    if (moved) fill_anew();
+    if (moved) fill_anew(true);
   };
   co_await parts_.compute.run(close);
+  co_await keep_closing(moved);
   // Where the robot still stands at the last scan that it took, that moves it too.
   if (!moved || last_by_robot_ < 0 || pilot_.travelled_m() != last_by_robot_at_m_) co_return;
   const ScanRecord& scan = record_.scans[static_cast<std::size_t>(last_by_robot_)];
@@ -261,25 +264,28 @@ bool Survey::fit_tour() {
 
 // The files of the scans, the cloud and the map, as if every scan had come with its pose of now.
 // What views were tried for and given up stays so.
-void Survey::fill_anew() {
+void Survey::fill_anew(bool save) {
   auto anew = std::make_unique<SiteModel>(config_, map_, tasks_.tasks, threads_);
   anew->take_up(*model_);
   CloudMerger cloud;
-  std::size_t merged = 0;
   for (ScanRecord& scan : record_.scans) {
     const bool refused = scan.fit.verdict == ScanVerdict::refused;
     if (!refused) {
-      const hal::ScanCloud measured = spool_.get(merged++).value();
+      const hal::ScanCloud measured =
+          parts_.store
+              .beams(scan.number, beams_checksums_[static_cast<std::size_t>(scan.number - 1)])
+              .value();
       const Eigen::Isometry3d T_W_S =
           scanner_pose(scan.believed, scan.ground_z_m, config_.robot.scanner.height_m);
       const std::vector<Eigen::Vector3f> W_points_m = scan_points(measured, T_W_S);
-      parts_.store
-          .save_scan(W_points_m, T_W_S,
-                     {.number = scan.number,
-                      .station = scan.name,
-                      .time_s = scan.end_s,
-                      .seed = config_.seed})
-          .value();
+      if (save)
+        parts_.store
+            .save_scan(W_points_m, T_W_S,
+                       {.number = scan.number,
+                        .station = scan.name,
+                        .time_s = scan.end_s,
+                        .seed = config_.seed})
+            .value();
       cloud.add(W_points_m);
       const ScanEffect effect = anew->add(measured, W_points_m, T_W_S, scan.ground_z_m);
       scan.points_outside_box = effect.points_outside_box;

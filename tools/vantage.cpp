@@ -20,6 +20,7 @@ int main(int argc, char** argv) {
       "  vantage localize --odometry wheels.csv --gnss rover.ubx --out way.tum\n"
       "  vantage explain F012\n"
       "  vantage route --site path/to/folder --from 0,0 --to 12,-8\n"
+      "  vantage resume runs/fort\n"
       "  vantage console\n"
       "Each command has its own --help, with examples. Every command but console knows --json.\n"
       "Exit: 0 fine, 1 tried and failed, 2 refused (every reason is on stderr, one a line).");
@@ -41,6 +42,7 @@ int main(int argc, char** argv) {
   vantage::add_explain_command(app, run);
   vantage::add_route_command(app, run);
   vantage::add_console_command(app, run);
+  vantage::add_resume_command(app, run);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

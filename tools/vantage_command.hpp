@@ -37,6 +37,7 @@ void add_register_command(CLI::App& app, Run& run);
 void add_localize_command(CLI::App& app, Run& run);
 void add_explain_command(CLI::App& app, Run& run);
 void add_route_command(CLI::App& app, Run& run);
+void add_resume_command(CLI::App& app, Run& run);
 void add_console_command(CLI::App& app, Run& run);
 
 // Bad input: what() is for the user, "FILE:LINE:COLUMN: ..." where there is a place. Exit 2.

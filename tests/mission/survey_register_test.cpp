@@ -39,46 +39,12 @@ class Recorder final : public hal::Scanner {
   std::vector<hal::ScanCloud> taken_;
 };
 
-// Four houses at a crossing, in place of the one.
-mission::Prepared crossing(const mission_test::SmallSite& site) {
-  struct Box {
-    double x_m, y_m, width_m, depth_m;
-  };
-  std::string map, model = "v -60 -60 0\nv 80 -60 0\nv 80 80 0\nv -60 80 0\nf 1 2 3\nf 1 3 4\n";
-  int corner = 5;
-  for (const auto& [x, y, w, d] :
-       {Box{0, 0, 6, 6}, Box{14, 0, 6, 5}, Box{0, 13, 7, 6}, Box{13, 12, 7, 8}}) {
-    const double xs[] = {x, x + w, x + w, x}, ys[] = {y, y, y + d, y + d};
-    map += map.empty() ? "[[" : ",[[";
-    for (const int i : {0, 1, 2, 3, 0}) {
-      if (i != 0 || !map.ends_with("[[")) map += ",";
-      map += "[" + std::to_string(xs[i]) + "," + std::to_string(ys[i]) + "]";
-    }
-    map += "]]";
-    for (const double z : {0.0, 5.0})
-      for (int i = 0; i < 4; ++i)
-        model += "v " + std::to_string(xs[i]) + " " + std::to_string(ys[i]) + " " +
-                 std::to_string(z) + "\n";
-    for (int i = 0; i < 4; ++i) {
-      const int a = corner + i, b = corner + (i + 1) % 4;
-      for (const auto& face : {std::array{a, b, b + 4}, std::array{a, b + 4, a + 4}})
-        model += "f " + std::to_string(face[0]) + " " + std::to_string(face[1]) + " " +
-                 std::to_string(face[2]) + "\n";
-    }
-    corner += 8;
-  }
-  std::ofstream(site.folder() / "footprint.geojson")
-      << R"({"type":"MultiPolygon","coordinates":[)" << map << "]}";
-  std::ofstream(site.folder() / "model.obj") << model;
-  return site.prepared();
-}
-
 // A mission on that site, and the survey as it stands at its end.
 class Mission {
  public:
   explicit Mission(std::set<int> lies = {}, int views_max = 2)
       : site_(mission_test::kQuickRobot, views_max),
-        ready_(crossing(site_)),
+        ready_(mission_test::crossing(site_)),
         backend_(ready_.config, ready_.tasks, std::move(ready_.sim), 1),
         recorder_(backend_.devices().scanner, std::move(lies)),
         store_(mission::RunStore::open(site_.out()).value()),
