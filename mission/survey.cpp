@@ -128,6 +128,7 @@ hal::Task<void> Survey::run() {
   orders_.end();
   note_given();
   record_.mission_s = now_s();
+  over_ = failure != nullptr;
   note_sensors();
   note_gnss();
   note_registration();
@@ -565,7 +566,8 @@ void Survey::drop(const Stop& stop, const std::string& reason) {
 }
 
 void Survey::decide(const json::object& decision) {
-  parts_.store.decide(decision).value();
+  const auto decided = parts_.store.decide(decision);
+  if (!decided && !over_) throw FileFailure(decided.error());
 }
 
 void Survey::show(const Stop& stop) {

@@ -191,6 +191,7 @@ class Survey {
   double before_s_{};  // Mission time of what went before, when it goes on with a run.
   std::string stop_reason_;
   SurveyOrders orders_;
+  bool over_ = false;  // Ended early: the disk may be why.
   Pilot pilot_;
   std::unique_ptr<SiteModel> model_;
   std::unique_ptr<MapMatcher> matcher_;  // Null: not asked for.

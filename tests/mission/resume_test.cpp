@@ -9,6 +9,8 @@
 #include <boost/json.hpp>
 #include <chrono>
 #include <cstdlib>
+#include <fstream>
+#include <limits>
 #include <random>
 #include <set>
 
@@ -206,6 +208,130 @@ TEST(Resume, ARunThatIsKilledAnywhereEndsWithTheScansOfOneThatWasNot) {
     if (testing::Test::HasFailure()) break;
   }
   EXPECT_GE(resumed, kills_wanted / 4) << "they were killed before their first scan";
+}
+
+// --- What is damaged is named.
+
+// A run that was killed when it had so many scans.
+void cut_after(const Crossing& site, int scans) {
+  const std::string next = "000" + std::to_string(scans + 1) + ".beams.part";
+  ASSERT_TRUE(site.run_until_killed(false, [&] {
+    static Killer killer(next);
+    mission::set_file_calls(&killer);
+  }));
+  ASSERT_EQ(site.history().scans().size(), static_cast<std::size_t>(scans));
+}
+
+void damage(const fs::path& file) {
+  std::fstream bytes(file, std::ios::in | std::ios::out | std::ios::binary);
+  bytes.seekp(static_cast<std::streamoff>(fs::file_size(file) / 2));
+  bytes << std::string(512, 'x');
+}
+
+TEST(Resume, ADamagedLastScanIsNamedAndTakenAgain) {
+  const Crossing site;
+  cut_after(site, 3);
+  const auto before = measured(site.history());
+  damage(site.out() / "scans" / "0003.beams");
+  const auto left = mission::find_left_run(site.out()).value();
+  ASSERT_TRUE(left);
+  EXPECT_THAT(left->last_scan_damage, HasSubstr("0003.beams: it is damaged"));
+  EXPECT_THAT(mission::offer_text(*left, site.out()), HasSubstr("to be taken again"));
+  const RunOutcome outcome = site.run(true);
+  ASSERT_EQ(outcome.failure, "");
+  const auto after = measured(site.history());
+  ASSERT_GE(after.size(), 5U);
+  EXPECT_EQ(after[0], before[0]);
+  EXPECT_EQ(after[1], before[1]);
+  EXPECT_NE(after[2], before[2]);
+  const auto all = names(outcome.record);
+  EXPECT_EQ(std::set<std::string>(all.begin(), all.end()).size(), all.size()) << "none twice";
+}
+
+TEST(Resume, AnyOtherDamagedScanIsNamedAndNothingIsDone) {
+  const Crossing site;
+  cut_after(site, 3);
+  damage(site.out() / "scans" / "0002.beams");
+  try {
+    (void)site.run(true);
+    FAIL() << "it went on";
+  } catch (const mission::FileFailure& error) {
+    EXPECT_THAT(error.what(), HasSubstr("0002.beams: it is damaged"));
+  }
+  fs::remove(site.out() / "scans" / "0002.beams");
+  EXPECT_THROW((void)site.run(true), mission::FileFailure);
+  EXPECT_EQ(site.history().scans().size(), 3U);
+}
+
+TEST(Resume, PointsThatAreNotWholeAreWrittenAgain) {
+  const Crossing site;
+  cut_after(site, 3);
+  const fs::path file = site.out() / "scans" / "0001.ply";
+  const std::string whole = mission::read_file(file).value();
+  fs::resize_file(file, whole.size() / 2);
+  fs::remove(site.out() / "scans" / "0002.ply");
+  const RunOutcome outcome = site.run(true);
+  ASSERT_EQ(outcome.failure, "");
+  EXPECT_THAT(outcome.record.notes,
+              testing::Contains(HasSubstr("0001.ply was written again from what was measured")));
+  for (const char* name : {"0001.ply", "0002.ply"})
+    EXPECT_GE(mission::read_file(site.out() / "scans" / name).value().size(), whole.size() / 2);
+}
+
+TEST(Resume, ADamagedJournalIsNamed) {
+  const Crossing site;
+  cut_after(site, 2);
+  {
+    auto file = mission::JournalFile::open(site.out() / "journal.sqlite").value();
+    std::vector<mission::JournalEvent> odd{{0, {}, "scan", "{\"scan\": 1}"}};
+    ASSERT_TRUE(file.append(odd));
+  }
+  const auto left = mission::find_left_run(site.out());
+  ASSERT_FALSE(left);
+  EXPECT_THAT(left.error().text(), HasSubstr("(scan) is damaged"));
+  EXPECT_THROW((void)site.run(true), mission::FileFailure);
+}
+
+TEST(Resume, ARunThatIsFinishedOrNotThereIsNotGoneOnWith) {
+  const Crossing site;
+  EXPECT_THROW((void)site.run(true), mission::CannotResume);
+  ASSERT_EQ(site.run(false).failure, "");
+  try {
+    (void)site.run(true);
+    FAIL() << "it went on";
+  } catch (const mission::CannotResume& error) {
+    EXPECT_THAT(error.what(), HasSubstr("is finished"));
+  }
+}
+
+// --- As structures.
+
+TEST(Resume, NumbersComeBackBitForBit) {
+  mission::TourClosed closed;
+  closed.scans = 0;
+  closed.so_far.mission_s = 0.1 + 0.2;
+  closed.so_far.driven_m = 1e-310;
+  closed.so_far.registration.moved_max_m = std::numeric_limits<double>::infinity();
+  mission::EventText event = mission::event_of(closed);
+  const std::vector<mission::JournalEvent> events{{1, {}, event.kind, event.text}};
+  const auto history = mission::read_history(events, "journal.sqlite").value();
+  EXPECT_EQ(history.so_far.mission_s, 0.1 + 0.2);
+  EXPECT_EQ(history.so_far.driven_m, 1e-310);
+  EXPECT_EQ(history.so_far.registration.moved_max_m, std::numeric_limits<double>::infinity());
+}
+
+TEST(Resume, WhatNoRunWritesIsRefusedByItsNumber) {
+  for (const auto& [kind, text] : {std::pair("scan", "{}"),
+                                   {"scan", "no json"},
+                                   {"leg", "[]"},
+                                   {"unheard", "{}"},
+                                   {"resumed", R"({"after":"", "scan_lost": 4})"}}) {
+    const std::vector<mission::JournalEvent> events{{7, {}, kind, text}};
+    const auto history = mission::read_history(events, "journal.sqlite");
+    ASSERT_FALSE(history) << kind;
+    EXPECT_EQ(history.error().code, boost::system::errc::bad_message);
+    EXPECT_THAT(history.error().text(), HasSubstr("event 7"));
+  }
 }
 
 }  // namespace
