@@ -34,10 +34,11 @@ hal::Task<bool> Survey::visit(const Stop& stop) {
       put_off_ = true;
       co_return false;
     }
-    const std::size_t tours_next = tours_next_;
+    const std::size_t tours_next = tours_next_, scans = record_.scans.size();
     bool done = false;
     const bool over = co_await finished(visit_into(stop, done));
     if (over) co_return done;
+    if (record_.scans.size() > scans) co_return true;  // It has the scan, which is being kept.
     tours_next_ = tours_next;
   }
 }
@@ -142,27 +143,14 @@ hal::Task<void> Survey::retour(std::size_t t, std::size_t done) {
   AreaPlan& plan = record_.plans[t];
   const auto rest = plan.tour.begin() + static_cast<std::ptrdiff_t>(done);
   const std::vector<int> left(rest, plan.tour.end());
-  std::vector<Eigen::Vector2d> stops_m{pilot_.pose().position_m};
-  for (const int s : left)
-    stops_m.push_back(pose_of(plan.cover.stations[static_cast<std::size_t>(s)].at).position_m);
-  stops_m.push_back(tasks_.start.position_m);
-  planning::Tour tour;
-  const std::function<void()> solve = [&] {
-    const Eigen::MatrixXd lengths_m = roads_[t].roadmap().lengths_m(stops_m);
-    const std::size_t nodes = left.size() + 1;
-    std::vector cost(nodes, std::vector<double>(nodes));
-    for (std::size_t i = 0; i < nodes; ++i)
-      for (std::size_t j = 0; j < nodes; ++j)  // Back to the first is home.
-        cost[i][j] =
-            lengths_m(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j == 0 ? nodes : j));
-    tour = planning::solve_tour({.cost = cost, .start = 0, .closed = config_.return_home});
+  const std::optional<Eigen::Vector2d> home_m =
+      config_.return_home ? std::optional(tasks_.start.position_m) : std::nullopt;
+  std::vector<int> order_of_stations;
+  const std::function<void()> solve = [&, here_m = Eigen::Vector2d(pilot_.pose().position_m)] {
+    order_of_stations = tour_from(here_m, plan, left, roads_[t].roadmap(), home_m);
   };
   co_await parts_.compute.run(solve);
-  auto into = rest;
-  for (const int node : tour.order)
-    if (node > 0) *into++ = left[static_cast<std::size_t>(node - 1)];
-  for (const int node : tour.unreachable)
-    if (node > 0) *into++ = left[static_cast<std::size_t>(node - 1)];
+  std::ranges::copy(order_of_stations, rest);
   plan.way_m.clear();  // It was of the old order.
   tours_next_ = done;
   tour_legs_s_.clear();
