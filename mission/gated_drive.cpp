@@ -33,6 +33,8 @@ constexpr std::uint16_t kEndsProof = static_cast<std::uint16_t>(Condition::estop
 // which only a person ends, when that lasts: a program that came late looks the same for a moment.
 constexpr int kSilentCycles = 10;
 
+constexpr hal::Duration kRollsOut = std::chrono::seconds(1);  // From the creep of a proof.
+
 std::string refusal(boost::system::error_code why) {
   if (why == errc::timed_out) return "it went on although it heard no more commands";
   if (why == errc::io_error) return "it could not be seen to move: free the robot";
@@ -196,6 +198,10 @@ void GatedDrive::finish() {
   ask_hold();
 }
 
+bool GatedDrive::creeps() const {
+  return proving_ || (proved_at_ != hal::Time{} && clock_.now() - proved_at_ < kRollsOut);
+}
+
 bool GatedDrive::held_by_people() const {
   return conditions_.has(Condition::estop) || conditions_.has(Condition::bumper) ||
          status_.remote_control;
@@ -233,6 +239,15 @@ hal::Task<Answer> GatedDrive::start() {
 
 // Whatever stops the robot ends the proof, too, and at once.
 hal::Task<void> GatedDrive::prove() {
+  struct Guard {  // Also when cancelled.
+    GatedDrive& of;
+    ~Guard() {
+      of.proving_ = false;
+      of.proved_at_ = of.clock_.now();
+    }
+  };
+  proving_ = true;
+  const Guard guard{*this};
   proof_failure_ = refusal(errc::make_error_code(errc::operation_canceled));
   const int first = co_await hal::first_of(try_to_prove(), until_stop(holds_));
   if (first == 0) co_return;
@@ -241,6 +256,7 @@ hal::Task<void> GatedDrive::prove() {
 }
 
 hal::Task<void> GatedDrive::try_to_prove() {
+  while (config_.scanning && config_.scanning()) co_await clock_.sleep_for(kGatePeriod);
   const auto took = co_await drive_.prove_timeout();
   proven_ = took.has_value();
   proof_failure_ = proven_ ? "" : refusal(took.error());

@@ -23,6 +23,8 @@ class GatedDrive final : public hal::Drive {
     // What the safety inputs say; nothing: the robot has none, or they were not heard yet. Called
     // in every cycle; must not allocate. May be empty.
     std::function<std::optional<hal::SafetyInputs>()> safety;
+    // A scan is being taken: the drive's time-out is not proven then. May be empty.
+    std::function<bool()> scanning;
     std::function<void(const std::string&)> tell;  // What happens, as it happens. May be empty.
     std::string how_to_release = "press the reset button";  // For the operator.
     // start() does not begin, however the program came up: a person does, by a release.
@@ -67,6 +69,8 @@ class GatedDrive final : public hal::Drive {
   Mode mode() const { return mode_; }
   bool released() const { return supervisor_.released; }
   bool begun() const { return begun_; }  // start() was called: releases count.
+  // The proof of the drive's time-out is under way, or the robot may still roll out after it.
+  bool creeps() const;
   // An e-stop, a bumper or a remote control holds it just now.
   bool held_by_people() const;
   // Until it is released, whatever for it was not.
@@ -116,6 +120,8 @@ class GatedDrive final : public hal::Drive {
   std::string proof_failure_;
   std::function<Surroundings()> around_;
   Surroundings is_;
+  bool proving_ = false;
+  hal::Time proved_at_{};  // The end of the latest proof; 0: none.
 
   hal::Twist planned_;
   hal::Time planned_at_{};

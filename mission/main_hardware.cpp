@@ -101,7 +101,7 @@ GuardedSurvey::GuardedSurvey(const Prepared& prepared, int threads, Config confi
       drive_(gate_, watch_, parts.clock),
       imu_(parts.drivers.imu(), watch_, parts.clock),
       gnss_(parts.drivers.gnss(), watch_, parts.clock),
-      scanner_(parts.drivers, watch_, parts.clock),
+      scanner_(parts.drivers, gate_, watch_, parts.clock),
       devices_{drive_,
                imu_,
                gnss_,
@@ -132,6 +132,7 @@ GatedDrive::Config GuardedSurvey::gated(const RobotConfig& robot) {
     EventText event = stopped_event(what);
     parts_.journal->tell(std::move(event.kind), std::move(event.text));
   };
+  config.scanning = [this] { return scanning(); };
   config.how_to_release = config_.how_to_release;
   config.boot = config_.boot;
   config.starts_held = config_.starts_held;

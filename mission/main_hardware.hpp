@@ -18,7 +18,8 @@ namespace mission {
 class GuardedSurvey {
  public:
   struct Config {
-    hal::Duration start_patience = std::chrono::seconds(60);  // For all devices to start.
+    // For all devices to start: some are switched on five minutes after the computer.
+    hal::Duration start_patience = std::chrono::seconds(330);
     DeviceWatch::Config watch;
     std::string how_to_release = "press the reset button";
     Boot boot = Boot::clean;
@@ -49,6 +50,7 @@ class GuardedSurvey {
   Survey& survey() { return survey_; }
   DeviceWatch& watch() { return watch_; }
   GatedDrive& gate() { return gate_; }
+  bool scanning() const { return scanner_.scanning(); }
   const std::string& failure() const { return failure_; }  // Why it ended early; else empty.
   const std::string& stop_reason() const { return stop_reason_; }  // As given to stop().
 

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace mission {
 namespace {
 
@@ -11,6 +13,7 @@ namespace errc = boost::system::errc;
 constexpr hal::Duration kLook = 50ms;
 constexpr hal::Duration kTryAgain = 100ms;
 constexpr hal::Duration kLossShows = 5s;  // That made a scan fail.
+constexpr hal::Duration kSteady = 5s;     // Lost again sooner, it is the same loss.
 
 bool away(const NamedDevice& named) {
   return named.device->state() != drivers::DeviceState::running;
@@ -37,12 +40,20 @@ hal::Task<void> DeviceWatch::run() {
   for (;;) {
     look();
     look_for_holds();
-    if (config_.held && config_.held()) lost_at_ = clock_.now();
+    if (held()) lost_at_ = clock_.now();
     if (!well_ && clock_.now() - lost_at_ > config_.patience) break;
     co_await clock_.sleep_for(kLook);
   }
   given_up_ = fmt::format("waited {:.0f} s in vain for {}", hal::seconds(config_.patience),
                           what_is_missing());
+}
+
+// Inputs that are not heard count as pressed, and nobody presses those.
+bool DeviceWatch::held() const {
+  const bool heard = std::ranges::none_of(drivers_.devices(), [](const NamedDevice& named) {
+    return named.role == "power" && away(named);
+  });
+  return heard && config_.held && config_.held();
 }
 
 // A reason that changes is told again.
@@ -52,12 +63,14 @@ void DeviceWatch::look() {
     if (!std::exchange(well_, true)) {
       note(fmt::format("all devices are back after {:.1f} s: it goes on",
                        hal::seconds(clock_.now() - lost_at_)));
+      back_at_ = clock_.now();
       back_.notify();
     }
     told_.clear();
     return;
   }
-  if (std::exchange(well_, false)) lost_at_ = clock_.now();
+  const bool anew = !back_at_ || clock_.now() - *back_at_ > kSteady;
+  if (std::exchange(well_, false) && anew) lost_at_ = clock_.now();
   if (missing == told_) return;
   told_ = missing;
   note("the robot stands, because it misses " + what_is_missing());
@@ -161,11 +174,22 @@ hal::Task<hal::Result<hal::GnssFix>> WatchedGnss::next_fix() {
   co_return co_await insist(watch_, clock_, next);
 }
 
+hal::Task<hal::Result<hal::ScanCloud>> WatchedScanner::scan_now() {
+  struct Guard {  // Also when cancelled.
+    bool& scanning;
+    ~Guard() { scanning = false; }
+  };
+  scanning_ = true;
+  const Guard guard{scanning_};
+  co_return co_await drivers_.scanner().scan();
+}
+
 hal::Task<hal::Result<hal::ScanCloud>> WatchedScanner::scan() {
   watch_.step(MissionStep::waits);
   co_await watch_.until_well();
+  while (gate_.creeps()) co_await clock_.sleep_for(kTryAgain);
   watch_.step(MissionStep::scans);
-  auto cloud = co_await drivers_.scanner().scan();
+  auto cloud = co_await scan_now();
   watch_.step(MissionStep::goes_on);
   if (cloud) co_return cloud;
   const std::string& problem = drivers_.scan_problem();

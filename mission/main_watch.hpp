@@ -24,7 +24,8 @@ enum class MissionStep {
 class DeviceWatch {
  public:
   struct Config {
-    hal::Duration patience = std::chrono::seconds(60);  // For one loss; then run() ends.
+    // For one loss, or for those that follow each other within 5 s; then run() ends.
+    hal::Duration patience = std::chrono::seconds(60);
     // What is wrong with the link of a role (see NamedDevice); it explains what is wrong behind it.
     std::function<std::vector<drivers::Trouble>(std::string_view role)> link_troubles;
     std::function<void(const std::string&)> tell;  // What happens, as it happens.
@@ -59,6 +60,7 @@ class DeviceWatch {
  private:
   std::string missing_names() const;
   void look_for_holds();
+  bool held() const;
 
   const Config config_;
   const RobotDrivers& drivers_;
@@ -67,6 +69,7 @@ class DeviceWatch {
   bool well_ = true;
   hal::Time lost_at_{};
   std::optional<FaultCode> hold_fault_;
+  std::optional<hal::Time> back_at_;
   std::string told_, given_up_;
   std::vector<std::string> notes_;
 };
@@ -113,18 +116,25 @@ class WatchedGnss final : public hal::Gnss {
   hal::Clock& clock_;
 };
 
-// Scans when every device is there. Says why a scan failed, and returns when a loss that made it
-// fail has shown: taking it again is the survey's.
+// Scans when every device is there and the robot does not creep for a proof. Says why a scan
+// failed, and returns when a loss that made it fail has shown: taking it again is the survey's.
 class WatchedScanner final : public hal::Scanner {
  public:
-  WatchedScanner(RobotDrivers& drivers, DeviceWatch& watch, hal::Clock& clock)
-      : drivers_(drivers), watch_(watch), clock_(clock) {}
+  WatchedScanner(RobotDrivers& drivers, const GatedDrive& gate, DeviceWatch& watch,
+                 hal::Clock& clock)
+      : drivers_(drivers), gate_(gate), watch_(watch), clock_(clock) {}
   hal::Task<hal::Result<hal::ScanCloud>> scan() override;
+  // A scan is being taken just now.
+  bool scanning() const { return scanning_; }
 
  private:
+  hal::Task<hal::Result<hal::ScanCloud>> scan_now();
+
   RobotDrivers& drivers_;
+  const GatedDrive& gate_;
   DeviceWatch& watch_;
   hal::Clock& clock_;
+  bool scanning_ = false;
 };
 
 // A robot on its own has nobody to carry its scanner: errc::operation_not_supported.

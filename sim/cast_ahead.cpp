@@ -6,7 +6,8 @@
 namespace sim {
 namespace {
 
-constexpr std::size_t kChunkMin = 4, kChunkMax = 64;  // Turns.
+constexpr std::size_t kChunkMin = 4, kChunkMax = 64;  // Turns,
+constexpr std::size_t kChunkMoving = 1;  // of a robot that is elsewhere by the next one.
 
 }  // namespace
 
@@ -31,25 +32,31 @@ void CastAhead::set_arc(const MirrorArc& arc, hal::Duration arc_time) {
   key_.reset();
 }
 
-std::span<const float> CastAhead::of(std::uint64_t number) {
+bool CastAhead::has(std::uint64_t number, std::uint64_t every) const {
+  return every == every_ && number >= turns_.front().number && number <= turns_.back().number &&
+         (number - turns_.front().number) % every == 0;
+}
+
+std::span<const float> CastAhead::of(std::uint64_t number, std::uint64_t every) {
   world_.advance(clock_.now());
   const auto& placed = world_.placed_scanner();
   const Key key{pan_.changes(), placed ? *placed : world_.robot()};
   const bool as_foreseen = key_ && *key_ == key;
-  if (!as_foreseen || number < turns_.front().number || number > turns_.back().number) {
-    chunk_ = as_foreseen ? std::min(2 * chunk_, kChunkMax) : kChunkMin;
+  if (!as_foreseen || !has(number, every)) {
+    const std::size_t least = world_.moving() ? kChunkMoving : kChunkMin;
+    chunk_ = as_foreseen ? std::min(2 * chunk_, kChunkMax) : least;
+    every_ = every;
     key_ = key;
     cast(number);
   }
-  const auto ranges_m = std::span<const float>(ranges_m_).subspan(
-      (number - turns_.front().number) * arc_.beams, arc_.beams);
-  return world_.people().empty() ? ranges_m : with_people(number, ranges_m);
+  const std::size_t at = (number - turns_.front().number) / every_;
+  const auto ranges_m = std::span<const float>(ranges_m_).subspan(at * arc_.beams, arc_.beams);
+  return world_.people().empty() ? ranges_m : with_people(turns_[at], ranges_m);
 }
 
 // People walk on while what stands was cast: they are put in as they are now.
-std::span<const float> CastAhead::with_people(std::uint64_t number,
+std::span<const float> CastAhead::with_people(const MirrorTurn& turn,
                                               std::span<const float> ranges_m) {
-  const MirrorTurn& turn = turns_[number - turns_.front().number];
   const Eigen::Isometry3d T_W_S = key_->at.T_W_S(world_.config().scanner.height_m);
   among_people_m_.assign(ranges_m.begin(), ranges_m.end());
   for (std::uint32_t i = 0; i < arc_.beams; ++i) {
@@ -73,8 +80,9 @@ std::span<const float> CastAhead::with_people(std::uint64_t number,
 void CastAhead::cast(std::uint64_t number) {
   turns_.clear();
   for (std::size_t i = 0; i < chunk_; ++i) {
-    const hal::Time start = start_(number + i);
-    turns_.push_back({number + i, pan_.angle_rad(start), pan_.angle_rad(start + arc_time_)});
+    const std::uint64_t turn = number + i * every_;
+    const hal::Time start = start_(turn);
+    turns_.push_back({turn, pan_.angle_rad(start), pan_.angle_rad(start + arc_time_)});
   }
   ranges_m_.resize(chunk_ * arc_.beams);
   caster_->cast(key_->at.T_W_S(world_.config().scanner.height_m), turns_, config_.threads,

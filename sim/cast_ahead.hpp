@@ -31,8 +31,9 @@ class CastAhead {
 
   // Another arc, or turns that begin at other times: forgets what was cast.
   void set_arc(const MirrorArc& arc, hal::Duration arc_time);
-  // One turn's ranges in metres, 0 where nothing comes back; until the next call.
-  std::span<const float> of(std::uint64_t number);
+  // One turn's ranges in metres, 0 where nothing comes back; until the next call. Only every so
+  // many turns are going to be asked for.
+  std::span<const float> of(std::uint64_t number, std::uint64_t every = 1);
 
   std::uint64_t turns_cast() const { return turns_cast_; }  // Those thrown away included.
 
@@ -42,8 +43,9 @@ class CastAhead {
     StandingPose at;
     bool operator==(const Key& other) const;
   };
+  bool has(std::uint64_t number, std::uint64_t every) const;
   void cast(std::uint64_t number);
-  std::span<const float> with_people(std::uint64_t number, std::span<const float> ranges_m);
+  std::span<const float> with_people(const MirrorTurn& turn, std::span<const float> ranges_m);
 
   const Config config_;
   World& world_;
@@ -57,6 +59,7 @@ class CastAhead {
   std::vector<MirrorTurn> turns_;
   std::vector<float> ranges_m_, among_people_m_;
   std::size_t chunk_ = 4;
+  std::uint64_t every_ = 1;
   std::uint64_t turns_cast_{};
 };
 

@@ -47,7 +47,7 @@ GnssMoment GnssSource::sample() {
       day_ns + std::llround(since_ns * (1 + config_.clock_skew) / 1e6) * 1'000'000 - kLeap_ns;
   const std::int64_t days = utc_ns >= 0 ? utc_ns / kDay_ns : -1;
   moment.utc_time_of_day_ns = utc_ns - days * kDay_ns;
-  moment.date = days_after(config_.date, days);
+  moment.date = days_after(config_.date, days + world_.date_shift_days());
   return moment;
 }
 

@@ -221,7 +221,7 @@ hal::Task<void> HokuyoUnit::measure() {
 }
 
 std::string HokuyoUnit::scan_text(std::uint64_t number) {
-  const auto ranges_m = ahead_.of(number);
+  const auto ranges_m = ahead_.of(number, static_cast<std::uint64_t>(stream_.skip + 1));
   std::string data;
   for (const float range_m : ranges_m) {
     const double mm = range_m * 1000.0 * faults_.wrong_factor() + 0.5;

@@ -12,8 +12,8 @@
 namespace sim {
 namespace {
 
-constexpr std::uint32_t kTile = 4;  // Packets of 4 neighbouring beams of 4 turns after each other.
-constexpr std::uint32_t kPacket = kTile * kTile;
+constexpr std::uint32_t kTile = 4;  // Packets of 4 neighbouring beams of 4 turns after each other,
+constexpr std::uint32_t kPacket = kTile * kTile;  // or of so many beams of a single turn.
 
 }  // namespace
 
@@ -32,6 +32,7 @@ struct ProfileCaster::Impl {
     std::span<const MirrorTurn> turns;
     std::uint64_t keys[kTile];
 
+    std::uint32_t width() const { return turns.size() == 1 ? kPacket : kTile; }  // Beams.
     void aim(std::uint32_t beam, RTCRayHit16& rays, int* valid) const;
     void cast(float* ranges_m) const;
   };
@@ -54,9 +55,9 @@ void ProfileCaster::Impl::Strip::aim(std::uint32_t beam, RTCRayHit16& rays, int*
   const auto beams = static_cast<std::uint32_t>(of.P_directions.size());
   for (std::uint32_t i = 0; i < kPacket; ++i) {
     const std::uint32_t turn =
-        std::min<std::uint32_t>(i / kTile, static_cast<std::uint32_t>(turns.size()) - 1);
-    const std::uint32_t b = std::min(beam + i % kTile, beams - 1);
-    valid[i] = i / kTile < turns.size() && beam + i % kTile < beams ? -1 : 0;
+        std::min<std::uint32_t>(i / width(), static_cast<std::uint32_t>(turns.size()) - 1);
+    const std::uint32_t b = std::min(beam + i % width(), beams - 1);
+    valid[i] = i / width() < turns.size() && beam + i % width() < beams ? -1 : 0;
     const double pan = turns[turn].pan_first_rad +
                        (turns[turn].pan_end_rad - turns[turn].pan_first_rad) * b / beams;
     const double c = std::cos(pan), s = std::sin(pan);
@@ -86,7 +87,7 @@ void ProfileCaster::Impl::Strip::cast(float* ranges_m) const {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  for (std::uint32_t beam = 0; beam < beams; beam += kTile) {
+  for (std::uint32_t beam = 0; beam < beams; beam += width()) {
     RTCRayHit16 rays;
     alignas(64) int valid[kPacket];
     aim(beam, rays, valid);
@@ -95,11 +96,12 @@ void ProfileCaster::Impl::Strip::cast(float* ranges_m) const {
       if (!valid[i]) continue;
       const Eigen::Vector3f normal(rays.hit.Ng_x[i], rays.hit.Ng_y[i], rays.hit.Ng_z[i]);
       const Eigen::Vector3f direction(rays.ray.dir_x[i], rays.ray.dir_y[i], rays.ray.dir_z[i]);
-      const std::uint32_t b = beam + i % kTile;
-      ranges_m[std::size_t{i / kTile} * beams + b] =
+      const std::uint32_t b = beam + i % width();
+      ranges_m[std::size_t{i / width()} * beams + b] =
           rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID
               ? 0.0F
-              : of.noise.reported_m(rays.ray.tfar[i], normal, direction, mix(keys[i / kTile] + b));
+              : of.noise.reported_m(rays.ray.tfar[i], normal, direction,
+                                    mix(keys[i / width()] + b));
     }
   }
 }

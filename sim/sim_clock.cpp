@@ -72,13 +72,18 @@ void SimClock::cancel(const Key& key) {
 void SimClock::wake_first() {
   const auto [key, sleeper] = *sleepers_.begin();
   sleepers_.erase(sleepers_.begin());
+  woken_at_once_ = key.first == now_ ? woken_at_once_ + 1 : 0;
+  if (woken_at_once_ > kReadyMax) throw Spins("time is asked for again and again and stands still");
   now_ = key.first;
   sleeper->finish(*sleeper, Sleeper::End::call, {});
 }
 
 void SimClock::run_ready() {
-  do io_.restart();
-  while (io_.poll() > 0);
+  for (int ran = 0; ran <= kReadyMax; ++ran) {
+    io_.restart();
+    if (io_.poll_one() == 0) return;
+  }
+  throw Spins("the event loop runs on and on while time stands still");
 }
 
 void SimClock::run_until(hal::Time end) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <stdexcept>
 #include <utility>
 
 #include "hal/clock.hpp"
@@ -16,13 +17,20 @@ namespace sim {
 //
 // What a handler throws (a top-level coroutine's own handler should rethrow) leaves run() and
 // run_until(); the clock can be run again afterwards. Destroy the clock before the io_context:
-// sleepers that are left then are unwound when the io_context is destroyed.
+// sleepers that are left then are unwound when the io_context is destroyed. Where more than
+// kReadyMax handlers run, or sleepers wake, while time stands still, somebody spins: run() and
+// run_until() throw Spins.
 class SimClock final : public hal::Clock {
  public:
   explicit SimClock(boost::asio::io_context& io) : io_(io) {}
   ~SimClock() override;
   SimClock(const SimClock&) = delete;
   SimClock& operator=(const SimClock&) = delete;
+
+  static constexpr int kReadyMax = 1'000'000;
+  struct Spins : std::runtime_error {
+    using runtime_error::runtime_error;
+  };
 
   hal::Time now() const override { return now_; }
   // A wake-up in the past wakes at once, after everything that is ready now.
@@ -49,6 +57,7 @@ class SimClock final : public hal::Clock {
   boost::asio::io_context& io_;
   hal::Time now_{};
   std::uint64_t asked_{};
+  int woken_at_once_{};  // Since time moved last.
   std::map<Key, Sleeper*> sleepers_;
 };
 

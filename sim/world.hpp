@@ -117,6 +117,9 @@ class World {
   hal::ImuSample sample_imu();     // Yaw rate over the latest tick.
   hal::GnssFix sample_gnss();
   bool gnss_hidden() const;  // No satellite is seen where the robot is.
+  // What day the satellites say it is: so many off from then on. Their time of day stays.
+  void shift_date(int days) { date_shift_days_ = days; }
+  int date_shift_days() const { return date_shift_days_; }
 
   // Where a scanner can stand near a pose: errc::address_not_available as put_robot, with the
   // tripod's radius.
@@ -168,6 +171,7 @@ class World {
   NoiseStream gnss_white_;
   WanderingNoise gnss_wander_x_, gnss_wander_y_;
   std::int64_t gnss_tick_ = 0;
+  int date_shift_days_ = 0;
   std::vector<Walker> people_;
   std::optional<StandingPose> placed_scanner_;
   std::uint64_t scans_begun_ = 0;

@@ -161,6 +161,21 @@ TEST_F(SimClockTest, ExceptionsLeaveTheRunAndTheRestGoesOn) {
   EXPECT_EQ(log, "b");
 }
 
+TEST_F(SimClockTest, SaysWhenSomebodySpinsWhileTimeStandsStill) {
+  bool sleeps = false;
+  spawn([](sim::SimClock& time, bool& by_sleeping) -> hal::Task<void> {
+    for (;;) {
+      if (by_sleeping)
+        co_await time.sleep_until(time.now());
+      else
+        co_await asio::post(co_await asio::this_coro::executor, asio::use_awaitable);
+    }
+  }(clock, sleeps));
+  EXPECT_THROW(clock.run([] { return false; }), sim::SimClock::Spins);
+  sleeps = true;
+  EXPECT_THROW(clock.run([] { return false; }), sim::SimClock::Spins);
+}
+
 TEST(SimClock, UnwindsSleepersThatAreLeftAtTheEnd) {
   struct Flag {
     bool& unwound;

@@ -1,0 +1,94 @@
+// vantage-dst: missions of the shipped executive and drivers on simulated devices that fail, one
+// for each seed, in virtual time. Ends with 1 at the first seed that violates what must always
+// hold, and says how to see it again.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "tests/dst/rig/matrix.hpp"
+#include "tests/dst/rig/missions.hpp"
+#include "tests/dst/rig/soak.hpp"
+
+namespace {
+
+struct Asked {
+  std::uint64_t seed = 1, replay = 0;
+  int missions = 200, jobs = 1;
+  bool matrix = false, verbose = false;
+  double soak_hours = 0;
+};
+
+int replay(std::uint64_t seed) {
+  std::fputs(dst::text(dst::draw_scenario(seed)).c_str(), stdout);
+  dst::Options options;
+  options.observe = true;
+  const dst::Outcome outcome = dst::run_seed(seed, options);
+  for (const std::string& note : outcome.notes) fmt::print("  said: {}\n", note);
+  for (const std::string& named : outcome.named) fmt::print("  named: {}\n", named);
+  fmt::print("  {} scans, {:.1f} m, {:.1f} s of virtual time in {:.2f} s of a core; end: {}\n",
+             outcome.scans, outcome.driven_m, hal::seconds(outcome.virtual_time), outcome.cpu_s,
+             outcome.end);
+  fmt::print("  trace: decisions {:016x}, frames {:016x}\n", outcome.decisions_hash,
+             outcome.frames_hash);
+  if (!outcome.violation) return 0;
+  std::fputs(dst::report(seed, *outcome.violation).c_str(), stdout);
+  return 1;
+}
+
+int run(const Asked& asked) {
+  const dst::Sums sums = dst::run_seeds(
+      asked.seed, asked.missions, asked.jobs, [&](std::uint64_t seed, const dst::Outcome& outcome) {
+        if (asked.verbose)
+          fmt::print(
+              "seed {}: {:.0f} s in {:.2f} s, {} scans, decisions {:016x}, frames {:016x}: {}\n",
+              seed, hal::seconds(outcome.virtual_time), outcome.cpu_s, outcome.scans,
+              outcome.decisions_hash, outcome.frames_hash, outcome.end);
+        if (outcome.violation) std::fputs(dst::report(seed, *outcome.violation).c_str(), stdout);
+        std::fflush(stdout);
+      });
+  std::fputs(sums.text().c_str(), stdout);
+  return sums.violated > 0 ? 1 : 0;
+}
+
+int matrix() {
+  int odd = 0;
+  for (const dst::Cell& cell : dst::matrix()) {
+    const dst::Outcome outcome = dst::run_cell(cell);
+    const std::string objection = dst::objection(cell, outcome);
+    std::fputs(dst::row(cell, outcome).c_str(), stdout);
+    if (!objection.empty()) fmt::print("  not as expected: {}\n", objection);
+    odd += !objection.empty();
+  }
+  fmt::print("{} cells, {} not as expected\n", dst::matrix().size(), odd);
+  return odd > 0 ? 1 : 0;
+}
+
+int soak(std::uint64_t seed, double hours) {
+  const dst::SoakResult result = dst::soak(seed, hal::from_seconds(hours * 3600));
+  std::fputs(result.text().c_str(), stdout);
+  if (!result.outcome.violation) return result.flat() ? 0 : 1;
+  std::fputs(dst::report(seed, *result.outcome.violation).c_str(), stdout);
+  return 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"Missions on devices that fail, in virtual time."};
+  Asked asked;
+  app.add_option("--seed", asked.seed, "of the first mission")->capture_default_str();
+  app.add_option("--missions", asked.missions, "how many, with seeds one after the other")
+      ->check(CLI::Range(1, 100'000'000))
+      ->capture_default_str();
+  app.add_option("--jobs", asked.jobs, "threads")->check(CLI::Range(1, 256))->capture_default_str();
+  app.add_flag("--verbose", asked.verbose, "a line for each mission");
+  app.add_flag("--matrix", asked.matrix, "every fault of every device once, with its reaction");
+  app.add_option("--soak-hours", asked.soak_hours,
+                 "one mission of so many virtual hours in which devices come and go");
+  const auto* again = app.add_option("--replay", asked.replay, "run this one seed, and tell all");
+  CLI11_PARSE(app, argc, argv);
+  if (again->count() > 0) return replay(asked.replay);
+  if (asked.matrix) return matrix();
+  return asked.soak_hours > 0 ? soak(asked.seed, asked.soak_hours) : run(asked);
+}

@@ -1,0 +1,56 @@
+// One mission: the guarded executive and the shipped drivers in virtual time, and what a scenario
+// does to them.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "tests/dst/rig/judge.hpp"
+#include "tests/dst/rig/scenario.hpp"
+
+namespace dst {
+
+struct Outcome {
+  std::optional<Violation> violation;
+  bool completed{};
+  std::string end;  // The mission's own reason.
+  std::vector<std::string> notes;
+  std::size_t scans{};
+  hal::Duration virtual_time{};
+  double cpu_s{};  // Of one core.
+  double driven_m{};
+  std::uint64_t decisions_hash{}, frames_hash{};  // The trace.
+  int stops{};
+  hal::Duration slowest_stop{};
+  // What the operator could read while it ran, where Options::observe: "imu: silent", "F001-...".
+  std::set<std::string> named;
+  bool held{};  // The robot was stopped, or stood for a missing device.
+
+  // Equal for equal traces.
+  bool same_trace(const Outcome& other) const {
+    return decisions_hash == other.decisions_hash && frames_hash == other.frames_hash &&
+           virtual_time == other.virtual_time && end == other.end;
+  }
+};
+
+struct Options {
+  bool observe = false;
+  hal::Duration observe_from{};
+  hal::Duration ends_within = std::chrono::hours(3);  // Of virtual time.
+  std::function<void()> each_minute = {};             // Of virtual time. May be empty.
+};
+
+Outcome run_mission(const support::RandomYard& yard, const Scenario& scenario,
+                    const Options& options = {});
+
+// The yard and the scenario of the seed.
+Outcome run_seed(std::uint64_t seed, const Options& options = {});
+
+// For people: what was violated, and how to see it again.
+std::string report(std::uint64_t seed, const Violation& violation);
+
+}  // namespace dst
