@@ -215,7 +215,6 @@ class Survey {
   std::size_t tours_next_{};         // Station of it after the one that is next.
   bool battery_low_{};               // For the last stop that was thought of.
   bool put_off_{};  // The stop was not visited: the stations left get a new order first.
-  int errands_{};   // Scans that a person ordered.
   std::optional<Progress> shown_;
   Eigen::Vector2d zone_at_m_{0, 0};  // Where the zone was looked up last.
   std::optional<double> zone_speed_mps_;

@@ -1,6 +1,7 @@
 // How a survey heeds what a person orders meanwhile.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -93,7 +94,10 @@ hal::Task<void> Survey::wait_for_orders() {
 
 hal::Task<void> Survey::run_errand(const SurveyOrders::Order& errand) {
   const bool scans = errand.kind == SurveyOrders::Kind::scan;
-  Stop stop{.name = scans ? fmt::format("ordered {}", ++errands_) : std::string("goto"),
+  const auto ordered = std::ranges::count_if(record_.scans, [](const ScanRecord& scan) {
+    return scan.name.starts_with("ordered ");  // Also before a run was resumed.
+  });
+  Stop stop{.name = scans ? fmt::format("ordered {}", ordered + 1) : std::string("goto"),
             .task = tasks_.start_area,
             .pose = scans ? pilot_.pose() : errand.goal,
             .station = nullptr,
