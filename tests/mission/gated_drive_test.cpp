@@ -424,7 +424,9 @@ TEST_F(GatedBase, IsIdleWhenTheMissionIsOver) {
 
 struct GatedByHand : GatedBase {
   std::uint32_t sequence = 0;
-  void press(hal::Twist by_hand, bool held = true) { gate->hear({++sequence, held, by_hand}); }
+  void press(hal::Twist by_hand, bool pressed = true) {
+    gate->hear({++sequence, pressed, by_hand});
+  }
   void hold(hal::Twist by_hand, hal::Duration span) {
     for (hal::Duration passed{}; passed < span; passed += 50ms) {
       press(by_hand);
@@ -468,9 +470,9 @@ TEST_F(GatedByHand, MoveNothingThatWasNotReleased) {
   ASSERT_EQ(start(), Answer::released);
   gate->ask_hold();
   wait(100ms);
-  const hal::Time held = clock.now();
+  const hal::Time since = clock.now();
   hold({0.3, 0}, 1s);
-  EXPECT_EQ(moving_after(held), 0);
+  EXPECT_EQ(moving_after(since), 0);
 }
 
 // --- The drive's own time-out.
