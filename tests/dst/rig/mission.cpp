@@ -44,6 +44,15 @@ std::uint64_t hash_of(const std::filesystem::path& file) {
   return hash;
 }
 
+std::vector<std::string> last_lines(const std::filesystem::path& file) {
+  constexpr std::size_t kLines = 5;
+  std::vector<std::string> lines;
+  std::ifstream in(file);
+  for (std::string line; std::getline(in, line); lines.push_back(line))
+    if (lines.size() == kLines) lines.erase(lines.begin());
+  return lines;
+}
+
 // Something that happens at a time.
 struct Happening {
   hal::Duration at{};
@@ -220,6 +229,7 @@ Outcome Mission::outcome() {
   outcome_.virtual_time = clock_.now().time_since_epoch();
   outcome_.driven_m = rig_.world().driven_m();
   outcome_.decisions_hash = hash_of(folder_.path() / "run" / "decisions.jsonl");
+  outcome_.decisions = last_lines(folder_.path() / "run" / "decisions.jsonl");
   outcome_.frames_hash = judge_.frames_hash();
   outcome_.stops = judge_.stops();
   outcome_.slowest_stop = judge_.slowest_stop();

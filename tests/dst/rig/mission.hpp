@@ -17,8 +17,8 @@ namespace dst {
 struct Outcome {
   std::optional<Violation> violation;
   bool completed{};
-  std::string end;  // The mission's own reason.
-  std::vector<std::string> notes;
+  std::string end;                            // The mission's own reason.
+  std::vector<std::string> notes, decisions;  // Of these the last ones.
   std::size_t scans{};
   hal::Duration virtual_time{};
   double cpu_s{};  // Of one core.
