@@ -107,7 +107,7 @@ GuardedSurvey::GuardedSurvey(const Prepared& prepared, int threads, Config confi
                gnss_,
                scanner_,
                placement_,
-               [&drivers = parts.drivers] { return drivers.complaints(); },
+               [this] { return complaints(); },
                parts.drivers.obstacles()},
       survey_(prepared.config, prepared.site.map, prepared.tasks, threads,
               {parts.clock, devices_, parts.store, parts.progress, parts.compute, parts.journal,
@@ -117,6 +117,11 @@ GuardedSurvey::GuardedSurvey(const Prepared& prepared, int threads, Config confi
     around.hold_fault = watch_.hold_fault();
     return around;
   });
+}
+
+std::string GuardedSurvey::complaints() {
+  const std::string gate = gate_.why(), all = parts_.drivers.complaints();
+  return gate + (gate.empty() || all.empty() ? "" : "; ") + all;
 }
 
 DeviceWatch::Config GuardedSurvey::watched(DeviceWatch::Config config) {

@@ -55,6 +55,7 @@ class GuardedSurvey {
   const std::string& stop_reason() const { return stop_reason_; }  // As given to stop().
 
  private:
+  std::string complaints();
   DeviceWatch::Config watched(DeviceWatch::Config config);
   GatedDrive::Config gated(const RobotConfig& robot);
   hal::Task<void> run();

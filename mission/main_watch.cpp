@@ -12,8 +12,9 @@ namespace errc = boost::system::errc;
 
 constexpr hal::Duration kLook = 50ms;
 constexpr hal::Duration kTryAgain = 100ms;
-constexpr hal::Duration kLossShows = 5s;  // That made a scan fail.
-constexpr hal::Duration kSteady = 5s;     // Lost again sooner, it is the same loss.
+constexpr hal::Duration kLossShows = 5s;   // That made a scan fail.
+constexpr hal::Duration kSteady = 5s;      // Lost again sooner, it is the same loss.
+constexpr hal::Duration kHoldMax = 10min;  // By a fault that a person has to do something about.
 
 bool away(const NamedDevice& named) {
   return named.device->state() != drivers::DeviceState::running;
@@ -150,11 +151,15 @@ hal::Task<hal::Result<void>> WatchedDrive::command(hal::Twist twist) {
   co_await watch_.until_well();
   co_await drive_.until_released();
   // Driven by a person, or held by what the mission can do nothing about.
-  const auto waits = [this] {
+  const auto holds = [this] {
     const auto by = drive_.held_by();
-    return drive_.mode() == Mode::teleop || (by && *by != FaultCode::range_stale);
+    return by && *by != FaultCode::range_stale;
   };
-  while (waits()) co_await clock_.sleep_for(kTryAgain);
+  for (hal::Time late = clock_.now() + kHoldMax; drive_.mode() == Mode::teleop || holds();) {
+    if (drive_.mode() == Mode::teleop) late = clock_.now() + kHoldMax;
+    if (clock_.now() >= late) co_return errc::make_error_code(errc::operation_not_permitted);
+    co_await clock_.sleep_for(kTryAgain);
+  }
   watch_.step(MissionStep::goes_on);
   co_return hal::Result<void>{};
 }

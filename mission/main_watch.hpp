@@ -82,7 +82,8 @@ class WatchedDrive final : public hal::Drive {
       : drive_(drive), watch_(watch), clock_(clock) {}
   // Waits, too, for a person to release a robot that was stopped, however long that takes. After a
   // wait the command counts as given and the robot stands: whoever drives looks again from where it
-  // is now.
+  // is now. A fault that holds the robot for longer than 10 min fails with
+  // errc::operation_not_permitted.
   hal::Task<hal::Result<void>> command(hal::Twist twist) override;
   hal::Task<hal::Result<hal::WheelTravel>> next_travel() override;
 

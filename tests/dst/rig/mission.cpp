@@ -190,7 +190,11 @@ hal::Task<void> Mission::observe() {
         outcome_.named.insert(named.role + ": " + std::string(trouble.fault->name));
     if (const auto stopped = survey_.gate().stopped_by())
       outcome_.named.insert(std::string(mission::entry_of(*stopped).id));
-    outcome_.held |= survey_.gate().mode() == mission::Mode::stopped || !survey_.watch().well();
+    const auto held_by = survey_.gate().held_by();
+    const bool holds = held_by && *held_by != mission::FaultCode::range_stale;
+    if (holds) outcome_.named.insert(std::string(mission::entry_of(*held_by).id));
+    outcome_.held |=
+        holds || survey_.gate().mode() == mission::Mode::stopped || !survey_.watch().well();
     co_await clock_.sleep_for(kObserve);
   }
 }
