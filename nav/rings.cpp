@@ -302,27 +302,50 @@ void add_edges(const std::vector<Ring>& rings, int net_a, int net_b, std::vector
   }
 }
 
+// Pairs of boxes that overlap, in their order; the boxes are in the order of x0. Looks for them in
+// bands of y: a pair counts in the lowest band that both reach.
+std::vector<std::pair<int, int>> overlapping(const std::vector<Box>& boxes) {
+  constexpr std::size_t kBoxesPerBand = 16, kBandsMax = 256;
+  if (boxes.empty()) return {};
+  std::int64_t low = boxes.front().y0, high = boxes.front().y1;
+  for (const Box& box : boxes) low = std::min(low, box.y0), high = std::max(high, box.y1);
+  const std::size_t count = std::clamp<std::size_t>(boxes.size() / kBoxesPerBand, 1, kBandsMax);
+  const std::int64_t height = (high - low) / static_cast<std::int64_t>(count) + 1;
+  const auto band_of = [&](std::int64_t y) { return static_cast<std::size_t>((y - low) / height); };
+  std::vector<std::vector<int>> bands(count);
+  for (std::size_t k = 0; k < boxes.size(); ++k)
+    for (std::size_t band = band_of(boxes[k].y0); band <= band_of(boxes[k].y1); ++band)
+      bands[band].push_back(static_cast<int>(k));
+  std::vector<std::pair<int, int>> pairs;
+  for (std::size_t band = 0; band < count; ++band)
+    for (std::size_t m = 0; m < bands[band].size(); ++m) {
+      const Box& mine = boxes[bands[band][m]];
+      for (std::size_t n = m + 1; n < bands[band].size(); ++n) {
+        const Box& other = boxes[bands[band][n]];
+        if (other.x0 > mine.x1) break;
+        if (other.y0 > mine.y1 || other.y1 < mine.y0) continue;
+        if (band_of(std::max(mine.y0, other.y0)) == band)
+          pairs.emplace_back(bands[band][m], bands[band][n]);
+      }
+    }
+  std::sort(pairs.begin(), pairs.end());
+  return pairs;
+}
+
 }  // namespace
 
 std::vector<Contact> contacts(const std::vector<SegmentMm>& edges) {
-  std::vector<Box> boxes;
-  boxes.reserve(edges.size());
-  for (const SegmentMm& e : edges) boxes.push_back(box_of(e));
   std::vector<int> order(edges.size());
   std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(),
-            [&](int i, int j) { return std::pair(boxes[i].x0, i) < std::pair(boxes[j].x0, j); });
+  std::erase_if(order, [&](int i) { return edges[i].a == edges[i].b; });
+  std::sort(order.begin(), order.end(), [&](int i, int j) {
+    return std::pair(box_of(edges[i]).x0, i) < std::pair(box_of(edges[j]).x0, j);
+  });
+  std::vector<Box> boxes;
+  boxes.reserve(order.size());
+  for (const int i : order) boxes.push_back(box_of(edges[i]));
   std::vector<Contact> found;
-  for (std::size_t k = 0; k < order.size(); ++k) {
-    const Box& mine = boxes[order[k]];
-    if (edges[order[k]].a == edges[order[k]].b) continue;
-    for (std::size_t l = k + 1; l < order.size() && boxes[order[l]].x0 <= mine.x1; ++l) {
-      const Box& other = boxes[order[l]];
-      if (other.y0 > mine.y1 || other.y1 < mine.y0) continue;
-      if (edges[order[l]].a == edges[order[l]].b) continue;
-      add_contacts(edges, order[k], order[l], found);
-    }
-  }
+  for (const auto& [k, l] : overlapping(boxes)) add_contacts(edges, order[k], order[l], found);
   return found;
 }
 
