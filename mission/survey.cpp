@@ -18,8 +18,10 @@ constexpr std::uint64_t kScansOfRoom = 2;  // Must be free on the disk before on
 constexpr int kScanTries = 3;              // At a stop,
 constexpr hal::Duration kScanPause = std::chrono::seconds(5);
 constexpr int kStopsWithoutScan = 2;  // and so many stops in a row: then no scanner is left.
-// How far a robot may be from where it was last known to be on its way, and turned (1-sigma).
-constexpr double kCutOffM = 2.0, kCutOffRad = 0.35;
+// How far a robot may be from where it was last known to be on its way, and turned (1-sigma): its
+// places are told every metre and 0.2 rad, and its drive goes on for up to half a second. No surer
+// than that, and it would stand for a pose that is too uncertain (survey_surroundings.cpp).
+constexpr double kCutOffM = 0.8, kCutOffRad = 0.22;
 
 // Trying again cannot help: the robot file asks for what the devices do not do.
 bool is_hopeless(boost::system::error_code error) {

@@ -1,6 +1,9 @@
 // What a survey tells its journal: what going on after a cut needs.
 #include <fmt/format.h>
 
+#include <cmath>
+
+#include "hal/angles.hpp"
 #include "mission/checksum.hpp"
 #include "mission/disk_fault.hpp"
 #include "mission/json_fields.hpp"
@@ -9,9 +12,10 @@
 namespace mission {
 namespace {
 
-// On the way a robot tells where it is once in so many metres: it is cut off near one of them.
-constexpr double kPlaceEveryM = 5;
-constexpr hal::Duration kPlacePause = std::chrono::seconds(1);
+// On the way a robot tells where it is once in so many metres, and when it has turned by so much: it
+// is cut off near one of these places.
+constexpr double kPlaceEveryM = 1, kPlaceEveryRad = 0.2;
+constexpr hal::Duration kPlacePause = std::chrono::milliseconds(200);
 
 }  // namespace
 
@@ -112,10 +116,13 @@ hal::Task<void> Survey::follow(const Stop& stop, LegEnd& leg) {
 
 // Ends only by cancellation.
 hal::Task<void> Survey::tell_places() {
-  for (double told_m = pilot_.travelled_m();;) {
+  double told_m = pilot_.travelled_m(), told_rad = pilot_.pose().heading_rad;
+  for (;;) {
     co_await parts_.clock.sleep_for(kPlacePause);
-    if (pilot_.travelled_m() - told_m < kPlaceEveryM) continue;
+    const double turned_rad = std::abs(hal::wrapped(pilot_.pose().heading_rad - told_rad));
+    if (pilot_.travelled_m() - told_m < kPlaceEveryM && turned_rad < kPlaceEveryRad) continue;
     told_m = pilot_.travelled_m();
+    told_rad = pilot_.pose().heading_rad;
     tell(event_of(whereabouts()));
   }
 }
