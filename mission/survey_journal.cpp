@@ -12,8 +12,8 @@
 namespace mission {
 namespace {
 
-// On the way a robot tells where it is once in so many metres, and when it has turned by so much: it
-// is cut off near one of these places.
+// On the way a robot tells where it is once in so many metres, and when it has turned by so much:
+// it is cut off near one of these places.
 constexpr double kPlaceEveryM = 1, kPlaceEveryRad = 0.2;
 constexpr hal::Duration kPlacePause = std::chrono::milliseconds(200);
 
