@@ -66,7 +66,7 @@ TEST(DiskFaults, AMissionEndsByNameWhateverCallFailsAndGoesOnAfterwards) {
   }
   ASSERT_GT(calls, 50);
   ASSERT_GE(wanted.size(), 2U);
-  const int step = nightly() ? 1 : calls / 20;
+  const int step = nightly() ? 1 : calls / 30;
   int ended_early = 0, resumed = 0;
   for (const int why : {EIO, ENOSPC}) {
     for (int n = 1 + (why == EIO ? 0 : step / 2); n <= calls; n += step) {
@@ -93,7 +93,7 @@ TEST(DiskFaults, AMissionEndsByNameWhateverCallFailsAndGoesOnAfterwards) {
       EXPECT_EQ(names(outcome.record), wanted);
     }
   }
-  EXPECT_GT(ended_early, 15);
+  EXPECT_GT(ended_early, 9);  // What is only told, a place say, may fail.
   EXPECT_GT(resumed, 4);
 }
 
