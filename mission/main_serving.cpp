@@ -73,6 +73,8 @@ void Serving::begin() {
   service_.log(fmt::format("serves {}: looks for its devices", prepared_.config.name));
   service_.log_memory("at the start");
   service_.prepare_for_real_time();
+  // It is due from now on, also if it never begins.
+  service_.heartbeat().tick(service_.tasks().event_loop, service_.clock().now());
   service_.watch();
   service_.ready();
 }
