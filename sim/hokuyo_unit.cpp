@@ -181,7 +181,8 @@ double HokuyoUnit::period_s() const {
 }
 
 hal::Time HokuyoUnit::turn_start(std::uint64_t number) const {
-  const double turns = static_cast<double>(number - turns_before_);
+  // Below 0 for a turn that began before the speed was set.
+  const auto turns = static_cast<double>(static_cast<std::int64_t>(number - turns_before_));
   return turning_since_ + hal::from_seconds(turns * period_s());
 }
 

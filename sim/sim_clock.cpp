@@ -71,9 +71,12 @@ void SimClock::cancel(const Key& key) {
 
 void SimClock::wake_first() {
   const auto [key, sleeper] = *sleepers_.begin();
-  sleepers_.erase(sleepers_.begin());
   woken_at_once_ = key.first == now_ ? woken_at_once_ + 1 : 0;
-  if (woken_at_once_ > kReadyMax) throw Spins("time is asked for again and again and stands still");
+  if (woken_at_once_ > kReadyMax) {
+    woken_at_once_ = 0;
+    throw Spins("time is asked for again and again and stands still");
+  }
+  sleepers_.erase(sleepers_.begin());
   now_ = key.first;
   sleeper->finish(*sleeper, Sleeper::End::call, {});
 }

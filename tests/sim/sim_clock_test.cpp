@@ -162,18 +162,20 @@ TEST_F(SimClockTest, ExceptionsLeaveTheRunAndTheRestGoesOn) {
 }
 
 TEST_F(SimClockTest, SaysWhenSomebodySpinsWhileTimeStandsStill) {
-  bool sleeps = false;
-  spawn([](sim::SimClock& time, bool& by_sleeping) -> hal::Task<void> {
-    for (;;) {
+  bool sleeps = false, over = false;
+  spawn([](sim::SimClock& time, const bool& by_sleeping, const bool& ends) -> hal::Task<void> {
+    while (!ends) {
       if (by_sleeping)
         co_await time.sleep_until(time.now());
       else
         co_await asio::post(co_await asio::this_coro::executor, asio::use_awaitable);
     }
-  }(clock, sleeps));
+  }(clock, sleeps, over));
   EXPECT_THROW(clock.run([] { return false; }), sim::SimClock::Spins);
   sleeps = true;
   EXPECT_THROW(clock.run([] { return false; }), sim::SimClock::Spins);
+  over = true;
+  EXPECT_FALSE(clock.run([] { return false; }));
 }
 
 TEST(SimClock, UnwindsSleepersThatAreLeftAtTheEnd) {
