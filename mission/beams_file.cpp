@@ -104,11 +104,6 @@ class BeamsFile {
 
 constexpr std::size_t kPiece = std::size_t{1} << 20;
 
-// In the same pieces for writers and readers.
-void add_in_pieces(Checksum& checksum, std::string_view bytes) {
-  for (std::size_t at = 0; at < bytes.size(); at += kPiece) checksum.add(bytes.substr(at, kPiece));
-}
-
 FileResult<void> compared(const std::filesystem::path& path, const Checksum& found,
                           std::uint64_t checksum) {
   if (found.value() != checksum) return damaged(path, "it is damaged: its checksum does not hold");
@@ -122,8 +117,8 @@ FileResult<std::uint64_t> write_beams(const std::filesystem::path& path,
   Header header = header_of(scan);
   Checksum checksum;
   checksum.add(bytes_of(header));
-  add_in_pieces(checksum, bytes_of(scan.ranges_m));
-  add_in_pieces(checksum, bytes_of(scan.beams));
+  checksum.add(bytes_of(scan.ranges_m));
+  checksum.add(bytes_of(scan.beams));
   header.checksum = checksum.value();
   const auto written =
       write_file(path, {bytes_of(header), bytes_of(scan.ranges_m), bytes_of(scan.beams)});
@@ -147,8 +142,8 @@ FileResult<hal::ScanCloud> read_beams(const std::filesystem::path& path, std::ui
     return got.error();
   Checksum found;
   found.add(bytes_of(*header));
-  add_in_pieces(found, bytes_of(scan.ranges_m));
-  add_in_pieces(found, bytes_of(scan.beams));
+  found.add(bytes_of(scan.ranges_m));
+  found.add(bytes_of(scan.beams));
   if (const auto same = compared(path, found, checksum); !same) return same.error();
   return scan;
 }

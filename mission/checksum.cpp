@@ -1,36 +1,30 @@
 #include "mission/checksum.hpp"
 
-#include <bit>
-#include <cstring>
+#include <xxhash.h>
+
+#include <new>
 
 namespace mission {
-namespace {
 
-static_assert(std::endian::native == std::endian::little);
-
-// One to one in the word for any value before, and the other way round.
-std::uint64_t mixed(std::uint64_t value, std::uint64_t word) {
-  return std::rotl((value ^ word) * 0xD6E8FEB86659FD93, 29) + 0xA0761D6478BD642F;
+Checksum::Checksum() : state_(XXH64_createState()) {
+  if (!state_) throw std::bad_alloc();
+  XXH64_reset(state_.get(), 0);
 }
 
-}  // namespace
+void Checksum::Free::operator()(XXH64_state_s* state) const {
+  XXH64_freeState(state);
+}
 
 void Checksum::add(std::string_view bytes) {
-  const std::size_t whole = bytes.size() / 8 * 8;
-  std::uint64_t word = 0;
-  for (std::size_t i = 0; i < whole; i += 8) {
-    std::memcpy(&word, bytes.data() + i, 8);
-    value_ = mixed(value_, word);
-  }
-  word = 0;
-  if (whole < bytes.size()) std::memcpy(&word, bytes.data() + whole, bytes.size() - whole);
-  value_ = mixed(mixed(value_, word), bytes.size());
+  XXH64_update(state_.get(), bytes.data(), bytes.size());
+}
+
+std::uint64_t Checksum::value() const {
+  return XXH64_digest(state_.get());
 }
 
 std::uint64_t checksum_of(std::string_view bytes) {
-  Checksum checksum;
-  checksum.add(bytes);
-  return checksum.value();
+  return XXH64(bytes.data(), bytes.size(), 0);
 }
 
 }  // namespace mission

@@ -1,21 +1,26 @@
-// Whether bytes are still those that were written.
+// Whether bytes are still those that were written: XXH64, against torn and lost sectors, not
+// against people. The same on every machine.
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string_view>
+
+struct XXH64_state_s;
 
 namespace mission {
 
-// Eight bytes at a time, some GB/s. A change within any one group of eight is always found, others
-// but for one in 2^64: against torn and lost sectors, not against people. The same on every
-// machine.
 class Checksum {
  public:
-  void add(std::string_view bytes);  // Two additions are not one of both together.
-  std::uint64_t value() const { return value_; }
+  Checksum();
+  void add(std::string_view bytes);
+  std::uint64_t value() const;  // Of all bytes so far, one after the other.
 
  private:
-  std::uint64_t value_ = 0x9E3779B97F4A7C15;
+  struct Free {
+    void operator()(XXH64_state_s* state) const;
+  };
+  std::unique_ptr<XXH64_state_s, Free> state_;
 };
 
 std::uint64_t checksum_of(std::string_view bytes);

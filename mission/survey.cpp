@@ -504,11 +504,7 @@ void Survey::merge(const hal::ScanCloud& cloud, const Stop& stop, ScanRecord& sc
   // Durable before it counts.
   if (keeps_beams())
     beams_checksums_.push_back(parts_.store.save_beams(scan.number, cloud).value());
-  parts_.store
-      .save_scan(
-          W_points_m, T_W_S,
-          {.number = scan.number, .station = scan.name, .time_s = scan.end_s, .seed = config_.seed})
-      .value();
+  save_points(scan, W_points_m, T_W_S);
   ScanEffect effect;
   if (scan.fit.verdict != ScanVerdict::refused)
     effect = insert(cloud, W_points_m, T_W_S, stop, scan);
@@ -535,6 +531,15 @@ void Survey::merge(const hal::ScanCloud& cloud, const Stop& stop, ScanRecord& sc
           {"new_obstacle_cells", effect.new_obstacles_m.size()},
           {"box_layers_added", effect.layers_added}});
   record_.scans.push_back(std::move(scan));
+}
+
+void Survey::save_points(const ScanRecord& scan, const std::vector<Eigen::Vector3f>& W_points_m,
+                         const Eigen::Isometry3d& T_W_S) {
+  parts_.store
+      .save_scan(
+          W_points_m, T_W_S,
+          {.number = scan.number, .station = scan.name, .time_s = scan.end_s, .seed = config_.seed})
+      .value();
 }
 
 ScanEffect Survey::insert(const hal::ScanCloud& cloud,

@@ -150,6 +150,8 @@ class Survey {
   hal::Task<bool> acquire(const Stop& stop, ScanRecord scan);
   hal::Task<std::optional<hal::ScanCloud>> take_scan(const Stop& stop);
   void merge(const hal::ScanCloud& cloud, const Stop& stop, ScanRecord& scan);
+  void save_points(const ScanRecord& scan, const std::vector<Eigen::Vector3f>& W_points_m,
+                   const Eigen::Isometry3d& T_W_S);
   ScanEffect insert(const hal::ScanCloud& cloud, const std::vector<Eigen::Vector3f>& W_points_m,
                     const Eigen::Isometry3d& T_W_S, const Stop& stop, ScanRecord& scan);
 

@@ -278,14 +278,7 @@ void Survey::fill_anew(bool save) {
       const Eigen::Isometry3d T_W_S =
           scanner_pose(scan.believed, scan.ground_z_m, config_.robot.scanner.height_m);
       const std::vector<Eigen::Vector3f> W_points_m = scan_points(measured, T_W_S);
-      if (save)
-        parts_.store
-            .save_scan(W_points_m, T_W_S,
-                       {.number = scan.number,
-                        .station = scan.name,
-                        .time_s = scan.end_s,
-                        .seed = config_.seed})
-            .value();
+      if (save) save_points(scan, W_points_m, T_W_S);
       cloud.add(W_points_m);
       const ScanEffect effect = anew->add(measured, W_points_m, T_W_S, scan.ground_z_m);
       scan.points_outside_box = effect.points_outside_box;

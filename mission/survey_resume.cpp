@@ -121,14 +121,7 @@ void Survey::mend_scans() {
         there->W_points_m.size() == scan.points)
       continue;
     const std::uint64_t checksum = beams_checksums_[static_cast<std::size_t>(scan.number - 1)];
-    const auto points = scan_points(parts_.store.beams(scan.number, checksum).value(), T_W_S);
-    parts_.store
-        .save_scan(points, T_W_S,
-                   {.number = scan.number,
-                    .station = scan.name,
-                    .time_s = scan.end_s,
-                    .seed = config_.seed})
-        .value();
+    save_points(scan, scan_points(parts_.store.beams(scan.number, checksum).value(), T_W_S), T_W_S);
     record_.notes.push_back(fmt::format("{} was written again from what was measured: {}",
                                         parts_.store.scan_path(scan.number).filename().string(),
                                         there ? "its pose is another" : there.error().text()));

@@ -12,7 +12,10 @@
 #include <filesystem>
 #include <thread>
 
+#include "mission/beams_file.hpp"
+#include "mission/main_run.hpp"
 #include "mission/main_service.hpp"
+#include "mission/resume.hpp"
 #include "tests/tools/vantage_test.hpp"
 
 namespace {
@@ -75,6 +78,23 @@ class Service : public test::VantageTest {
     execl(program.c_str(), "vantaged", "--service", "--quiet", "--out", out.c_str(),
           mission.c_str(), nullptr);
     _exit(127);
+  }
+
+  // A run of this mission with one scan, as a cut leaves it.
+  void leave_run() const {
+    const fs::path run = state_ / "runs/0001", file = folder_.path() / "yard/mission.toml";
+    fs::create_directories(run / "scans");
+    const auto prepared = mission::prepare(file, {}, mission::WorldUse::backend);
+    mission::ScanDone scan;
+    scan.scan.number = 1;
+    scan.scan.name = "station 1";
+    scan.beams_checksum = mission::write_beams(run / "scans/0001.beams", {}).value();
+    const auto inputs = mission::run_inputs(file, prepared.config).value();
+    std::vector<mission::JournalEvent> events;
+    for (auto& [kind, text] : {mission::event_of(mission::RunBegun{"yard", "hardware", inputs}),
+                               mission::event_of(scan)})
+      events.push_back({0, hal::Time{}, kind, text});
+    ASSERT_TRUE(mission::JournalFile::open(run / "journal.sqlite")->append(events));
   }
 
   // The next message; empty: none for so long.
@@ -204,6 +224,33 @@ TEST_F(Service, CheckConfigOnReloadAndSaysWhatTheNextStartWouldChange) {
   EXPECT_TRUE(hears("unknown key 'sede'"));
   EXPECT_TRUE(hears("would not start again"));
   EXPECT_GE(fed_within(1s), 2) << "it goes on";
+}
+
+TEST_F(Service, GoesOnWithTheRunThatItLeft) {
+  leave_run();
+  start();
+  EXPECT_TRUE(hears("READY=1"));
+  EXPECT_THAT(said(), HasSubstr("an unfinished run of yard lies in"));
+  EXPECT_THAT(said(), Not(HasSubstr("begins a new run")));
+  EXPECT_FALSE(fs::exists(state_ / "runs/0002"));
+  kill(pid_, SIGTERM);
+  EXPECT_EQ(exit_code(), 3) << said();
+  const auto left = mission::find_left_run(state_ / "runs/0001");
+  ASSERT_TRUE(left && left->has_value());
+  EXPECT_EQ((*left)->history.resumed, 1);
+  EXPECT_EQ((*left)->history.scans().size(), 1U);
+}
+
+TEST_F(Service, BeginsANewRunWhereItCannotGoOnAndTouchesNothing) {
+  leave_run();
+  write("yard/mission.toml", "seed = 7\n" + test::read_text(kServedYard / "mission.toml"));
+  start();
+  EXPECT_TRUE(hears("READY=1"));
+  EXPECT_THAT(said(), HasSubstr("begins a new run instead: the mission file"));
+  EXPECT_TRUE(fs::exists(state_ / "runs/0002"));
+  const auto left = mission::find_left_run(state_ / "runs/0001");
+  ASSERT_TRUE(left && left->has_value());
+  EXPECT_EQ((*left)->history.resumed, 0);
 }
 
 TEST_F(Service, IsRefusedWithASimulatedRobotAndLeavesNothing) {

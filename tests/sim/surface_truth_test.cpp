@@ -220,16 +220,20 @@ TEST(JudgeSurface, AgreesWithTheDefinitionOnRandomSites) {
   const auto uniform = [&](double low, double high) {
     return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
   };
+  // Drawn in this order whatever the compiler.
+  const auto point = [&](double low, double high, double z_low, double z_high) -> Vector3d {
+    const double z = uniform(z_low, z_high), y = uniform(low, high);
+    return {uniform(low, high), y, z};
+  };
   for (int site = 0; site < 12; ++site) {
     sim::Mesh mesh = sim_test::plain(12);
     for (int i = 0; i < 5; ++i) {
-      const Vector3d low(uniform(-10, 6), uniform(-10, 6), uniform(-0.5, 2));
-      sim_test::add_box(mesh, low, low + Vector3d(uniform(.3, 6), uniform(.3, 6), uniform(.3, 6)));
+      const Vector3d low = point(-10, 6, -0.5, 2);
+      sim_test::add_box(mesh, low, low + point(.3, 6, .3, 6));
     }
     for (int i = 0; i < 40; ++i) {  // Loose shards.
-      const Vector3d at(uniform(-10, 10), uniform(-10, 10), uniform(0, 8));
-      for (int k = 0; k < 3; ++k)
-        mesh.W_vertices_m.push_back(at + Vector3d(uniform(-2, 2), uniform(-2, 2), uniform(-2, 2)));
+      const Vector3d at = point(-10, 10, 0, 8);
+      for (int k = 0; k < 3; ++k) mesh.W_vertices_m.push_back(at + point(-2, 2, -2, 2));
       const auto n = static_cast<std::uint32_t>(mesh.W_vertices_m.size());
       mesh.triangles.push_back({n - 3, n - 2, n - 1});
     }
