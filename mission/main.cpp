@@ -117,12 +117,15 @@ RunPlace service_run(const std::filesystem::path& runs, const mission::Prepared&
     } else if (left->has_value()) {
       const auto now = mission::run_inputs(prepared.mission_file, prepared.config).value();
       const auto& begun = (*left)->history.begun;
-      const std::vector<std::string> changed =
+      std::vector<std::string> obstacles =
           begun ? mission::changed_inputs(*begun, now)
                 : std::vector<std::string>{"its journal lacks the beginning"};
       service.log(mission::offer_text(**left, last));
-      if (changed.empty()) return {last, true};
-      service.log("begins a new run instead: " + changed.front());
+      mission::RunHistory history = (*left)->history;
+      if (const auto whole = mission::verify_scans(history, last); !whole)
+        obstacles.push_back(whole.error().text());
+      if (obstacles.empty()) return {last, true};
+      service.log("begins a new run instead: " + obstacles.front());
     }
   }
   return {mission::next_run_folder(runs), false};

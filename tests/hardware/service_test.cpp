@@ -80,20 +80,25 @@ class Service : public test::VantageTest {
     _exit(127);
   }
 
-  // A run of this mission with one scan, as a cut leaves it.
+  // A run of this mission with two scans, as a cut leaves it.
   void leave_run() const {
     const fs::path run = state_ / "runs/0001", file = folder_.path() / "yard/mission.toml";
     fs::create_directories(run / "scans");
     const auto prepared = mission::prepare(file, {}, mission::WorldUse::backend);
-    mission::ScanDone scan;
-    scan.scan.number = 1;
-    scan.scan.name = "station 1";
-    scan.beams_checksum = mission::write_beams(run / "scans/0001.beams", {}).value();
     const auto inputs = mission::run_inputs(file, prepared.config).value();
     std::vector<mission::JournalEvent> events;
-    for (auto& [kind, text] : {mission::event_of(mission::RunBegun{"yard", "hardware", inputs}),
-                               mission::event_of(scan)})
-      events.push_back({0, hal::Time{}, kind, text});
+    const auto add = [&](const mission::EventText& event) {
+      events.push_back({0, hal::Time{}, event.kind, event.text});
+    };
+    add(mission::event_of(mission::RunBegun{"yard", "hardware", inputs}));
+    for (const int number : {1, 2}) {
+      mission::ScanDone scan;
+      scan.scan.number = number;
+      scan.scan.name = "station " + std::to_string(number);
+      const fs::path beams = run / "scans" / ("000" + std::to_string(number) + ".beams");
+      scan.beams_checksum = mission::write_beams(beams, {}).value();
+      add(mission::event_of(scan));
+    }
     ASSERT_TRUE(mission::JournalFile::open(run / "journal.sqlite")->append(events));
   }
 
@@ -238,7 +243,7 @@ TEST_F(Service, GoesOnWithTheRunThatItLeft) {
   const auto left = mission::find_left_run(state_ / "runs/0001");
   ASSERT_TRUE(left && left->has_value());
   EXPECT_EQ((*left)->history.resumed, 1);
-  EXPECT_EQ((*left)->history.scans().size(), 1U);
+  EXPECT_EQ((*left)->history.scans().size(), 2U);
 }
 
 TEST_F(Service, BeginsANewRunWhereItCannotGoOnAndTouchesNothing) {
@@ -251,6 +256,16 @@ TEST_F(Service, BeginsANewRunWhereItCannotGoOnAndTouchesNothing) {
   const auto left = mission::find_left_run(state_ / "runs/0001");
   ASSERT_TRUE(left && left->has_value());
   EXPECT_EQ((*left)->history.resumed, 0);
+}
+
+TEST_F(Service, BeginsANewRunWhereAScanOfTheOldOneIsDamaged) {
+  leave_run();
+  fs::resize_file(state_ / "runs/0001/scans/0001.beams", 70);
+  start();
+  EXPECT_TRUE(hears("READY=1"));
+  EXPECT_THAT(said(), HasSubstr("begins a new run instead: "));
+  EXPECT_THAT(said(), HasSubstr("0001.beams"));
+  EXPECT_TRUE(fs::exists(state_ / "runs/0002"));
 }
 
 TEST_F(Service, IsRefusedWithASimulatedRobotAndLeavesNothing) {
