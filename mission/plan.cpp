@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "mission/plan_file.hpp"
+#include "nav/innermost.hpp"
 #include "nav/polygons.hpp"
 #include "planning/tour.hpp"
 
@@ -15,6 +16,7 @@ namespace {
 
 // A pocket this small is not worth carrying a scanner into unless the mission names its region.
 constexpr double kManualAreaMinM2 = 25.0;
+constexpr double kRoomiestWithinM = 0.25;  // Of an assumed start.
 
 std::optional<AreaMode> mode_named(const MissionConfig& config, const std::string& region) {
   const auto found = config.regions.find(region);
@@ -47,19 +49,6 @@ int home_area(const MissionConfig& config, const nav::SiteMap& map,
   if (const int named = largest(areas, named_robot); named >= 0) return named;
   return largest(areas,
                  [&](const nav::FreeArea& area) { return !mode_named(config, area.region); });
-}
-
-// Somewhere to stand: a point of the area far from its walls, found by shrinking the area.
-Eigen::Vector2d roomy_point(const nav::FreeArea& area) {
-  nav::Polygons inner = area.standable;
-  for (std::int64_t step_mm = 8000; step_mm >= 250; step_mm /= 2) {
-    for (;;) {
-      nav::Polygons smaller = nav::offset(inner, -step_mm);
-      if (smaller.empty()) break;
-      inner = std::move(smaller);
-    }
-  }
-  return nav::to_m(inner.front().outer.front());
 }
 
 AreaMode mode_of(const MissionConfig& config, const nav::FreeArea& area, bool is_home) {
@@ -157,7 +146,7 @@ SiteTasks assign_areas(const MissionConfig& config, const nav::SiteMap& map,
     result.start = *map.start;
   } else if (home >= 0) {
     const nav::FreeArea& area = areas[static_cast<std::size_t>(home)];
-    result.start.position_m = roomy_point(area);
+    result.start.position_m = nav::to_m(nav::innermost(area.standable, kRoomiestWithinM));
     result.notes.push_back(
         fmt::format("the map has no start: the robot is assumed at ({:.2f}, {:.2f}) in area '{}', "
                     "heading 0 deg",

@@ -57,17 +57,16 @@ double length_m(const Path& path) {
   return sum_m;
 }
 
-struct Contact {
+struct Bump {
   double distance_m = std::numeric_limits<double>::infinity();  // Along the way.
   Vector2d W_point_m{0, 0};
 };
 
 // Where along the way something comes to touch the robot. A thing that is nearer than `keep`
 // already is in the way only where the robot goes on towards it.
-Contact first_contact(const ZoneConfig& config, std::span<const Vector2d> obstacles,
-                      const Way& way) {
+Bump first_bump(const ZoneConfig& config, std::span<const Vector2d> obstacles, const Way& way) {
   const double keep_m = config.robot_radius_m + config.keep_m;
-  Contact first;
+  Bump first;
   for (const Vector2d& point : obstacles) {
     double before_m = (point - way.front()).norm();
     if (before_m > keep_m + static_cast<double>(way.size()) * kWayStepM) continue;
@@ -172,7 +171,7 @@ Zones look_ahead(const ZoneConfig& config, std::span<const Vector2d> W_obstacles
                  const hal::Twist& twist) {
   Zones zones;
   const Way way = way_along(path, progress_m, config.horizon_m, pose.position_m);
-  const Contact on_path = first_contact(config, W_obstacles_m, way);
+  const Bump on_path = first_bump(config, W_obstacles_m, way);
   if (on_path.distance_m < length_m(path) - progress_m - config.end_slack_m) {
     zones.W_in_way_m = on_path.W_point_m;
     zones.cap_mps = stopping_speed_mps(config, on_path.distance_m - config.stop_gap_m);
@@ -181,8 +180,8 @@ Zones look_ahead(const ZoneConfig& config, std::span<const Vector2d> W_obstacles
     const double v = std::abs(twist.forward_mps);
     const double runs_m =
         config.touch_gap_m + v * config.reaction_s + v * v / (2 * config.brake_max_mps2);
-    const Contact on_arc =
-        first_contact(config, W_obstacles_m, way_of(pose, twist, runs_m + 2 * kWayStepM));
+    const Bump on_arc =
+        first_bump(config, W_obstacles_m, way_of(pose, twist, runs_m + 2 * kWayStepM));
     const double arc_mps = stopping_speed_mps(config, on_arc.distance_m - config.touch_gap_m);
     if (arc_mps < zones.cap_mps) {
       zones.cap_mps = arc_mps;
