@@ -144,6 +144,7 @@ struct Phase1Config {
   int candidates = 1000;
   double coverage_goal = 0.98;
   double gain_min = 0.02;
+  double gain_enough_m = 5;
   double overlap_min = 0.2;
 };
 

@@ -79,7 +79,11 @@ SectionSpec phase1_section() {
        keys.number("coverage_goal", &P::coverage_goal, 0.01, 1, "share",
                    "Of the target wall that any candidate can see; stop there"),
        keys.number("gain_min", &P::gain_min, 0, 1, "share",
-                   "Of the target wall; stop when the next station adds less"),
+                   "Of the target wall; stop when the next station adds less and less than "
+                   "`gain_enough_m`"),
+       keys.number("gain_enough_m", &P::gain_enough_m, 0, 1e6, "m",
+                   "Of target wall; a station that adds so much is worth its time on a site of any "
+                   "size"),
        keys.number("overlap_min", &P::overlap_min, 0, 0.95, "share",
                    "Of what a station sees that earlier stations must see too")},
       {},

@@ -168,6 +168,7 @@ planning::CoverConfig cover_config(const Phase1Config& phase1) {
           .candidates = phase1.candidates,
           .coverage_goal = phase1.coverage_goal,
           .gain_min = phase1.gain_min,
+          .gain_enough_m = phase1.gain_enough_m,
           .overlap_min = phase1.overlap_min,
           .given = std::nullopt};
 }

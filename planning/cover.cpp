@@ -117,6 +117,13 @@ std::string percent(double part, double whole) {
   return nav::decimal(whole > 0 ? 100 * part / whole : 100, 1) + " %";
 }
 
+std::string least_gain(const CoverConfig& config) {
+  std::string words = "gain_min (" + percent(config.gain_min, 1) + ")";
+  if (std::isfinite(config.gain_enough_m))
+    words += " and gain_enough_m (" + nav::decimal(config.gain_enough_m, 1) + " m)";
+  return words;
+}
+
 std::string in_words(const GreedyCover& cover, const CoverPlan& plan, const CoverConfig& config) {
   if (plan.candidates.empty()) return "The scanner can stand nowhere in this area.";
   if (plan.target_m <= 0) return "No wall that counts borders this area.";
@@ -129,8 +136,7 @@ std::string in_words(const GreedyCover& cover, const CoverPlan& plan, const Cove
              percent(config.coverage_goal, 1) + ").";
     case CoverEnd::gain:
       return "The best further view would add " + gain(cover.next_gain_nm) +
-             " of the target walls, less than gain_min (" + percent(config.gain_min, 1) +
-             "); covered is " + share + ".";
+             " of the target walls, less than " + least_gain(config) + "; covered is " + share + ".";
     case CoverEnd::overlap:
       return "Further views would add up to " + gain(cover.next_gain_refused_nm) +
              " of the target walls, but overlap the others by less than overlap_min (" +
@@ -212,6 +218,13 @@ std::int64_t share_of(double share, std::int64_t whole_nm) {
   return static_cast<std::int64_t>(std::ceil(share * static_cast<double>(whole_nm)));
 }
 
+// What a further station must add.
+std::int64_t gain_min_nm(const CoverConfig& config, std::int64_t target_nm) {
+  const std::int64_t share_nm = share_of(config.gain_min, target_nm);
+  if (config.gain_enough_m >= nm_to_m(share_nm)) return share_nm;
+  return to_nm(config.gain_enough_m);
+}
+
 }  // namespace
 
 CoverPlan plan_cover(const nav::FreeArea& area, const std::vector<Wall>& walls,
@@ -228,7 +241,7 @@ CoverPlan plan_cover(const nav::FreeArea& area, const std::vector<Wall>& walls,
   SpanSet coverable(walls.size());
   for (const auto& view : views) coverable.add(view);
   const CoverRules rules{.goal_nm = share_of(config.coverage_goal, coverable.total_nm()),
-                         .gain_min_nm = share_of(config.gain_min, targets.total_nm()),
+                         .gain_min_nm = gain_min_nm(config, targets.total_nm()),
                          .overlap_min = config.overlap_min};
   const StationChoice choice = chosen(views, walls.size(), rules, config, seed);
   const GreedyCover& cover = choice.cover;

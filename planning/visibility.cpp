@@ -188,7 +188,7 @@ const Words& words(Excluded reason) {
       {"overlap", "The stations that see it overlap the others too little to be registered.",
        "Lower overlap_min, or try more candidates."},
       {"gain", "A station for it would add less than the smallest gain worth a scan.",
-       "Lower gain_min to have such pieces covered too."},
+       "Lower gain_min or gain_enough_m to have such pieces covered too."},
       {"goal", "The coverage goal was reached without it.", "Raise coverage_goal."},
       {"given", "None of the stations given by the plan file sees it; others could.",
        "Add a station to the plan file, or leave it out to have one planned."},

@@ -102,6 +102,7 @@ cover = "greedy"
 candidates = 7
 coverage_goal = 0.5
 gain_min = 0
+gain_enough_m = 4
 overlap_min = 0.25
 [phase2]
 voxel_m = 0.5
@@ -226,6 +227,7 @@ phase1.cover=greedy
 phase1.candidates=7
 phase1.coverage_goal=0.5
 phase1.gain_min=0
+phase1.gain_enough_m=4
 phase1.overlap_min=0.25
 phase2.voxel_m=0.5
 phase2.height_m=12.5

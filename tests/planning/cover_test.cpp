@@ -359,6 +359,20 @@ TEST(PlanCover, StationsObeyTheRulesAndLengthsAddUp) {
   }
 }
 
+TEST(PlanCover, AStationThatAddsEnoughMetresIsTakenWhateverItsShare) {
+  const Site s = random_site(3);
+  CoverConfig config{.method = CoverMethod::greedy, .candidates = 300, .gain_min = 0.2};
+  const CoverPlan by_share = plan_cover(s.area, s.walls, kScanner, config, 3, 2);
+  config.gain_enough_m = 4;
+  const CoverPlan by_metres = plan_cover(s.area, s.walls, kScanner, config, 3, 2);
+  ASSERT_LT(config.gain_enough_m, config.gain_min * by_share.target_m);
+  EXPECT_GT(by_metres.covered_m, by_share.covered_m + 4);
+  for (const Station& station : by_metres.stations) EXPECT_GE(station.adds_m, 4 - 1e-8);
+  config.gain_min = 0;  // The lesser of the two counts.
+  const CoverPlan all = plan_cover(s.area, s.walls, kScanner, config, 3, 2);
+  EXPECT_GE(all.covered_m, by_metres.covered_m);
+}
+
 TEST(PlanCover, RefinedTakesNoMoreStationsThanGreedyAndSaysHowFewCouldDo) {
   int fewer = 0;
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
