@@ -9,8 +9,11 @@ namespace hal {
 // 3 * kDeg is three degrees in radians.
 inline constexpr double kDeg = std::numbers::pi / 180;
 
-constexpr double radians(double degrees) {
-  return degrees * std::numbers::pi / 180;
+constexpr double radians(double angle_deg) {
+  return angle_deg * std::numbers::pi / 180;
+}
+constexpr double degrees(double angle_rad) {
+  return angle_rad * 180 / std::numbers::pi;
 }
 
 // The same direction in [-pi, pi].

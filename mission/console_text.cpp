@@ -5,7 +5,7 @@
 namespace mission {
 namespace {
 
-constexpr std::size_t kColumns = 79;
+constexpr std::size_t kConsoleColumns = 79;
 constexpr std::string_view kIndent = "  ";
 
 // Where a line that is too long is broken: after the last space that fits, else where it is full.
@@ -17,8 +17,8 @@ std::size_t break_at(std::string_view line, std::size_t room) {
 
 void put_line(std::string_view line, std::string& out) {
   std::string_view indent;
-  while (line.size() + indent.size() > kColumns) {
-    const std::size_t end = break_at(line, kColumns - indent.size());
+  while (line.size() + indent.size() > kConsoleColumns) {
+    const std::size_t end = break_at(line, kConsoleColumns - indent.size());
     out.append(indent).append(line.substr(0, end)).append("\r\n");
     line.remove_prefix(end);
     line.remove_prefix(std::min(line.find_first_not_of(' '), line.size()));

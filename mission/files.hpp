@@ -27,6 +27,10 @@ struct FileError {
 
   std::string text() const;  // "cannot write runs/7/map.ot: No space left on device"
 };
+// Its bytes are not what such a file holds.
+inline FileError unreadable(const std::filesystem::path& path, std::string detail) {
+  return {path, "read", make_error_code(boost::system::errc::bad_message), std::move(detail)};
+}
 
 template <class T>
 using FileResult = boost::system::result<T, FileError>;

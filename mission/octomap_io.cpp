@@ -175,10 +175,6 @@ bool fill(VoxelMap& map, const OctomapKey& first, const OctomapLeaf& leaf) {
   return true;
 }
 
-FileError bad(const std::filesystem::path& path, std::string detail) {
-  return {path, "read", make_error_code(boost::system::errc::bad_message), std::move(detail)};
-}
-
 }  // namespace
 
 Eigen::Vector3d octomap_offset_m(const VoxelGrid& grid) {
@@ -217,20 +213,22 @@ FileResult<OctomapWritten> write_octomap(const std::filesystem::path& path, cons
 
 FileResult<OctomapMap> parse_octomap(std::string_view bytes, const std::filesystem::path& path) {
   Header header;
-  if (auto wrong = take_header(bytes, header); !wrong.empty()) return bad(path, std::move(wrong));
+  if (auto wrong = take_header(bytes, header); !wrong.empty())
+    return unreadable(path, std::move(wrong));
   // Twice through the tree, so that only the map itself takes memory.
   Span span;
   std::size_t nodes{};
   const auto add = [&span](const OctomapLeaf& leaf) { return span.add(leaf), true; };
   if (auto wrong = read_tree(bytes, header.format, nodes, add); !wrong.empty())
-    return bad(path, std::move(wrong));
+    return unreadable(path, std::move(wrong));
   if (nodes != (*header.nodes)[0])
-    return bad(path, fmt::format("its tree has {} nodes, its line 'size' says {}", nodes,
-                                 (*header.nodes)[0]));
+    return unreadable(path, fmt::format("its tree has {} nodes, its line 'size' says {}", nodes,
+                                        (*header.nodes)[0]));
   const auto described = described_grid(header);
-  if (!described && span.empty()) return bad(path, "it holds no known voxel, so it has no size");
+  if (!described && span.empty())
+    return unreadable(path, "it holds no known voxel, so it has no size");
   const VoxelGrid grid = described ? *described : span.grid((*header.resolution_m)[0]);
-  if (auto wrong = too_large(grid); !wrong.empty()) return bad(path, std::move(wrong));
+  if (auto wrong = too_large(grid); !wrong.empty()) return unreadable(path, std::move(wrong));
 
   OctomapMap read{VoxelMap(grid), {0, 0, 0}, described.has_value()};
   if (described) read.offset_m = octomap_offset_m(grid);
@@ -238,7 +236,7 @@ FileResult<OctomapMap> parse_octomap(std::string_view bytes, const std::filesyst
   bool within = true;
   const auto set = [&](const OctomapLeaf& leaf) { return within = fill(read.map, first, leaf); };
   read_tree(bytes, header.format, nodes, set);
-  if (!within) return bad(path, "a voxel lies outside the box that its header gives");
+  if (!within) return unreadable(path, "a voxel lies outside the box that its header gives");
   return read;
 }
 

@@ -49,10 +49,6 @@ std::string header(std::string_view comments, std::size_t count) {
                      count, kProperties);
 }
 
-FileError bad(const std::filesystem::path& path, std::string detail) {
-  return {path, "read", make_error_code(boost::system::errc::bad_message), std::move(detail)};
-}
-
 // Takes the next line off the text; false when there is none that ends.
 bool take_line(std::string_view& text, std::string_view& line) {
   const auto end = text.find('\n');
@@ -87,7 +83,7 @@ FileResult<std::size_t> parse_comments(std::string_view& text, PlyCloud& cloud,
       cloud.comments.emplace_back(line);
       if (!line.starts_with(kPose)) continue;
       cloud.T_W_S = parse_pose(line.substr(kPose.size()));
-      if (!cloud.T_W_S) return bad(path, "the pose in its header is not 16 numbers");
+      if (!cloud.T_W_S) return unreadable(path, "the pose in its header is not 16 numbers");
     } else if (line.starts_with(kVertex)) {
       std::size_t count{};
       const auto end = line.data() + line.size();
@@ -98,7 +94,7 @@ FileResult<std::size_t> parse_comments(std::string_view& text, PlyCloud& cloud,
       break;
     }
   }
-  return bad(path, fmt::format("unexpected header line '{}'", line.substr(0, 40)));
+  return unreadable(path, fmt::format("unexpected header line '{}'", line.substr(0, 40)));
 }
 
 }  // namespace
@@ -173,16 +169,16 @@ FileResult<void> write_scan_ply(const std::filesystem::path& path,
 
 FileResult<PlyCloud> parse_ply(std::string_view bytes, const std::filesystem::path& path) {
   constexpr std::string_view kStart = "ply\nformat binary_little_endian 1.0\n";
-  if (!bytes.starts_with(kStart)) return bad(path, "not a binary little-endian PLY file");
+  if (!bytes.starts_with(kStart)) return unreadable(path, "not a binary little-endian PLY file");
   bytes.remove_prefix(kStart.size());
   PlyCloud cloud;
   const auto count = parse_comments(bytes, cloud, path);
   if (!count) return count.error();
-  if (!bytes.starts_with(kProperties)) return bad(path, "its points are not float x, y, z");
+  if (!bytes.starts_with(kProperties)) return unreadable(path, "its points are not float x, y, z");
   bytes.remove_prefix(kProperties.size());
   if (bytes.size() % 12 != 0 || bytes.size() / 12 != *count) {
-    return bad(path, fmt::format("its header promises {} points, {} bytes follow (12 each)", *count,
-                                 bytes.size()));
+    return unreadable(path, fmt::format("its header promises {} points, {} bytes follow (12 each)",
+                                        *count, bytes.size()));
   }
   cloud.W_points_m.resize(*count);
   if (*count > 0) {

@@ -31,6 +31,10 @@ inline std::int64_t cross(PointMm a, PointMm b) {
 inline std::int64_t dot(PointMm a, PointMm b) {
   return a.x * b.x + a.y * b.y;
 }
+// -1, 0 or 1.
+inline int sign(std::int64_t value) {
+  return (value > 0) - (value < 0);
+}
 // > 0 where c lies left of the line from a to b.
 inline std::int64_t side(PointMm a, PointMm b, PointMm c) {
   return cross(b - a, c - a);
@@ -44,6 +48,12 @@ inline Eigen::Vector2d to_m(PointMm point) {
 }
 inline double length_m(PointMm a, PointMm b) {
   return (to_m(b) - to_m(a)).norm();
+}
+
+// values[i] where indices are int.
+template <class T>
+const T& item(const std::vector<T>& values, int i) {
+  return values[static_cast<std::size_t>(i)];
 }
 
 struct SegmentMm {

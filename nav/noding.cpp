@@ -17,10 +17,6 @@ Eigen::Vector2d exact(PointMm p) {
   return {static_cast<double>(p.x), static_cast<double>(p.y)};
 }
 
-int sign(std::int64_t value) {
-  return value > 0 ? 1 : value < 0 ? -1 : 0;
-}
-
 // p is known to lie on the line through the piece.
 bool strictly_between(const OutlinePiece& piece, PointMm p) {
   return dot(p - piece.a, piece.b - piece.a) > 0 && dot(p - piece.b, piece.a - piece.b) > 0;

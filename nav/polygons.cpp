@@ -72,7 +72,7 @@ Eigen::Vector2d right_of(PointMm a, PointMm b, double length_mm) {
   return Eigen::Vector2d(d.y(), -d.x()) * (length_mm / d.norm());
 }
 
-PointMm moved(PointMm p, const Eigen::Vector2d& by_mm) {
+PointMm shifted(PointMm p, const Eigen::Vector2d& by_mm) {
   return {p.x + std::llround(by_mm.x()), p.y + std::llround(by_mm.y())};
 }
 
@@ -85,12 +85,12 @@ void append_arc(PointMm v, const Eigen::Vector2d& from_mm, const Eigen::Vector2d
   const double step_max = 2 * std::acos(radius_mm / (radius_mm + kArcToleranceMm));
   const int steps = std::max(1, static_cast<int>(std::ceil(turn / step_max)));
   const double step = turn / steps;
-  curve.push_back(moved(v, from_mm));
+  curve.push_back(shifted(v, from_mm));
   for (int i = 0; i < steps; ++i) {
     const Eigen::Rotation2Dd rotation((i + 0.5) * step);
-    curve.push_back(moved(v, rotation * from_mm / std::cos(step / 2)));
+    curve.push_back(shifted(v, rotation * from_mm / std::cos(step / 2)));
   }
-  curve.push_back(moved(v, to_mm));
+  curve.push_back(shifted(v, to_mm));
 }
 
 // The sum of the ring, a rectangle of the given width on the right of each edge and a sector at
@@ -108,9 +108,9 @@ Ring grown_curve(const Ring& ring, double distance_mm) {
     if (side(before, v, after) > 0) {
       append_arc(v, from_mm, to_mm, curve);
     } else {
-      curve.push_back(moved(v, from_mm));
+      curve.push_back(shifted(v, from_mm));
       curve.push_back(v);
-      curve.push_back(moved(v, to_mm));
+      curve.push_back(shifted(v, to_mm));
     }
   }
   return curve;
@@ -119,8 +119,8 @@ Ring grown_curve(const Ring& ring, double distance_mm) {
 Ring rectangle_along(PointMm a, PointMm b, double half_width_mm) {
   const Eigen::Vector2d right = right_of(a, b, half_width_mm);
   const Eigen::Vector2d ahead(-right.y(), right.x());
-  return {moved(a, right - ahead), moved(b, right + ahead), moved(b, ahead - right),
-          moved(a, -right - ahead)};
+  return {shifted(a, right - ahead), shifted(b, right + ahead), shifted(b, ahead - right),
+          shifted(a, -right - ahead)};
 }
 
 template <class Visit>

@@ -19,10 +19,6 @@ Box box_of(const SegmentMm& s) {
   return {x0, y0, x1, y1};
 }
 
-int sign(std::int64_t value) {
-  return (value > 0) - (value < 0);
-}
-
 // Strictly between the ends of an edge on whose line the point lies.
 bool inside_edge(const SegmentMm& edge, PointMm point) {
   return dot(point - edge.a, edge.b - edge.a) > 0 && dot(point - edge.b, edge.a - edge.b) > 0;

@@ -17,11 +17,6 @@ constexpr double kRoadStepM = 1.0;
 constexpr std::size_t kLooseBlocksMin = 32;
 constexpr double kRoundingM = 1e-9;
 
-template <class T>
-const T& at(const std::vector<T>& values, int i) {
-  return values[static_cast<std::size_t>(i)];
-}
-
 BoxTree tree_of(const std::vector<Segment2>& segments) {
   std::vector<Box2> boxes;
   boxes.reserve(segments.size());
@@ -68,7 +63,7 @@ Roadmap Roadmap::build(const FreeArea& area, double robot_radius_m) {
   first.assign(fixed->axis.nodes_m.size() + 1, 0);
   std::vector<Segment2> roads_m;
   for (const MedialAxis::Edge& e : edges) {
-    roads_m.push_back({at(fixed->axis.nodes_m, e.a), at(fixed->axis.nodes_m, e.b)});
+    roads_m.push_back({item(fixed->axis.nodes_m, e.a), item(fixed->axis.nodes_m, e.b)});
     ++first[static_cast<std::size_t>(e.a) + 1];
     ++first[static_cast<std::size_t>(e.b) + 1];
   }
@@ -81,9 +76,9 @@ Roadmap Roadmap::build(const FreeArea& area, double robot_radius_m) {
     fixed->half_edges[static_cast<std::size_t>(slot)] = {to, edge, length_m};
   };
   for (int i = 0; i < static_cast<int>(edges.size()); ++i) {
-    const double length_m = (at(roads_m, i).b - at(roads_m, i).a).norm();
-    append(at(edges, i).a, at(edges, i).b, i, length_m);
-    append(at(edges, i).b, at(edges, i).a, i, length_m);
+    const double length_m = (item(roads_m, i).b - item(roads_m, i).a).norm();
+    append(item(edges, i).a, item(edges, i).b, i, length_m);
+    append(item(edges, i).b, item(edges, i).a, i, length_m);
   }
 
   Roadmap roadmap;
@@ -129,7 +124,7 @@ void Roadmap::add_block(const Block& block) {
 }
 
 double Roadmap::block_distance(int block, const Segment2& piece_m) const {
-  const Block& b = at(blocks_, block);
+  const Block& b = item(blocks_, block);
   return std::max(0.0, distance_to_box(piece_m, b.min, b.max) - b.radius_m);
 }
 
@@ -153,7 +148,7 @@ bool Roadmap::blocked(const Vector2d& point_m) const {
 double Roadmap::clearance_m(const Segment2& piece_m, double cap_m) const {
   double least_m = cap_m;
   fixed_->outline_tree.near(piece_m, least_m, [&](int i) {
-    return least_m = std::min(least_m, distance(piece_m, at(fixed_->outline_m, i)));
+    return least_m = std::min(least_m, distance(piece_m, item(fixed_->outline_m, i)));
   });
   blocks_near(piece_m, least_m,
               [&](int i) { return least_m = std::min(least_m, block_distance(i, piece_m)); });
@@ -173,7 +168,7 @@ bool Roadmap::is_free(const Segment2& piece_m, double keep_m, const Vector2d* le
     return -1.0;
   };
   fixed_->outline_tree.near(piece_m, keep_m, [&](int i) {
-    const Segment2& wall = at(fixed_->outline_m, i);
+    const Segment2& wall = item(fixed_->outline_m, i);
     return judge(distance(piece_m, wall), [&] { return distance(wall, *leaving); });
   });
   if (!free) return false;
@@ -193,8 +188,8 @@ bool Roadmap::sees(const Vector2d& from_m, const Vector2d& to_m) const {
 }
 
 Segment2 Roadmap::edge_segment(int edge) const {
-  const MedialAxis::Edge& e = at(fixed_->axis.edges, edge);
-  return {at(fixed_->axis.nodes_m, e.a), at(fixed_->axis.nodes_m, e.b)};
+  const MedialAxis::Edge& e = item(fixed_->axis.edges, edge);
+  return {item(fixed_->axis.nodes_m, e.a), item(fixed_->axis.nodes_m, e.b)};
 }
 
 double Roadmap::length_m() const {
@@ -205,24 +200,24 @@ double Roadmap::length_m() const {
 
 std::vector<std::vector<Vector2d>> Roadmap::polylines() const {
   const auto degree = [&](int node) {
-    return at(fixed_->first_half_edge, node + 1) - at(fixed_->first_half_edge, node);
+    return item(fixed_->first_half_edge, node + 1) - item(fixed_->first_half_edge, node);
   };
   std::vector<char> drawn(fixed_->axis.edges.size(), 0);
   std::vector<std::vector<Vector2d>> lines;
   const auto draw_from = [&](int node) {
-    for (int h = at(fixed_->first_half_edge, node); h < at(fixed_->first_half_edge, node + 1);
+    for (int h = item(fixed_->first_half_edge, node); h < item(fixed_->first_half_edge, node + 1);
          ++h) {
-      if (at(drawn, at(fixed_->half_edges, h).edge)) continue;
-      std::vector<Vector2d> line{at(fixed_->axis.nodes_m, node)};
+      if (item(drawn, item(fixed_->half_edges, h).edge)) continue;
+      std::vector<Vector2d> line{item(fixed_->axis.nodes_m, node)};
       for (int next = h; next >= 0;) {
-        const HalfEdge& step = at(fixed_->half_edges, next);
+        const HalfEdge& step = item(fixed_->half_edges, next);
         drawn[static_cast<std::size_t>(step.edge)] = 1;
-        line.push_back(at(fixed_->axis.nodes_m, step.to));
+        line.push_back(item(fixed_->axis.nodes_m, step.to));
         next = -1;
         if (degree(step.to) != 2) break;
         for (int k = 0; k < 2; ++k) {
-          const int onward = at(fixed_->first_half_edge, step.to) + k;
-          if (!at(drawn, at(fixed_->half_edges, onward).edge)) next = onward;
+          const int onward = item(fixed_->first_half_edge, step.to) + k;
+          if (!item(drawn, item(fixed_->half_edges, onward).edge)) next = onward;
         }
       }
       lines.push_back(std::move(line));

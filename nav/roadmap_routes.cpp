@@ -18,11 +18,6 @@ constexpr int kEdgesAtTop = 4;   // The same where climbing away from the neares
 constexpr double kClimbErrorM = 1e-4;
 constexpr double kTopReachM = 0.2;
 
-template <class T>
-const T& at(const std::vector<T>& values, int i) {
-  return values[static_cast<std::size_t>(i)];
-}
-
 }  // namespace
 
 struct Roadmap::Tree {
@@ -51,11 +46,11 @@ std::vector<int> Roadmap::nearest_edges(const Vector2d& point_m, int count) cons
 std::optional<Vector2d> Roadmap::climb(const Vector2d& point_m) const {
   const auto wall_m = [&](const Vector2d& p) {
     return fixed_->outline_tree.nearest(
-        {p, p}, kInfinity, [&](int i) { return distance(at(fixed_->outline_m, i), p); });
+        {p, p}, kInfinity, [&](int i) { return distance(item(fixed_->outline_m, i), p); });
   };
   const BoxTree::Found wall = wall_m(point_m);
   if (wall.item < 0 || wall.distance == 0) return std::nullopt;
-  const Vector2d foot = closest_point(at(fixed_->outline_m, wall.item), point_m);
+  const Vector2d foot = closest_point(item(fixed_->outline_m, wall.item), point_m);
   const Vector2d up = (point_m - foot) / wall.distance;
   const auto still_nearest = [&](double height_m) {
     return wall_m(foot + height_m * up).distance >= height_m - kClimbErrorM / 100;
@@ -124,19 +119,19 @@ Roadmap::Tree Roadmap::search(const std::vector<Link>& starts, const std::vector
     known_m = length_m;
     tree.parent[static_cast<std::size_t>(node)] = parent;
     tree.link[static_cast<std::size_t>(node)] = link;
-    const double rest_m = to_m != nullptr ? (*to_m - at(fixed_->axis.nodes_m, node)).norm() : 0;
+    const double rest_m = to_m != nullptr ? (*to_m - item(fixed_->axis.nodes_m, node)).norm() : 0;
     open.emplace(length_m + rest_m, length_m, node);
   };
   for (int i = 0; i < static_cast<int>(starts.size()); ++i) {
-    const Link& link = at(starts, i);
-    const MedialAxis::Edge& e = at(fixed_->axis.edges, link.edge);
+    const Link& link = item(starts, i);
+    const MedialAxis::Edge& e = item(fixed_->axis.edges, link.edge);
     const Segment2 road = edge_segment(link.edge);
     reach(e.a, link.length_m + link.along_m, -1, i);
     reach(e.b, link.length_m + (road.b - road.a).norm() - link.along_m, -1, i);
   }
   std::vector<std::pair<int, double>> exits;  // Node, and the length from it to the goal.
   for (const Link& link : goals) {
-    const MedialAxis::Edge& e = at(fixed_->axis.edges, link.edge);
+    const MedialAxis::Edge& e = item(fixed_->axis.edges, link.edge);
     const Segment2 road = edge_segment(link.edge);
     exits.emplace_back(e.a, link.length_m + link.along_m);
     exits.emplace_back(e.b, link.length_m + (road.b - road.a).norm() - link.along_m);
@@ -146,15 +141,15 @@ Roadmap::Tree Roadmap::search(const std::vector<Link>& starts, const std::vector
   while (!open.empty()) {
     const auto [estimate_m, length_m, node] = open.top();
     open.pop();
-    if (length_m > at(tree.length_m, node)) continue;
+    if (length_m > item(tree.length_m, node)) continue;
     if (estimate_m >= best_m) break;
     ++tree.nodes_searched;
     for (auto exit = std::lower_bound(exits.begin(), exits.end(), std::pair(node, 0.0));
          exit != exits.end() && exit->first == node; ++exit)
       best_m = std::min(best_m, length_m + exit->second);
-    for (int h = at(fixed_->first_half_edge, node); h < at(fixed_->first_half_edge, node + 1);
+    for (int h = item(fixed_->first_half_edge, node); h < item(fixed_->first_half_edge, node + 1);
          ++h) {
-      const HalfEdge& half = at(fixed_->half_edges, h);
+      const HalfEdge& half = item(fixed_->half_edges, h);
       if (!edge_blocked(half.edge)) reach(half.to, length_m + half.length_m, node, -1);
     }
   }
@@ -163,25 +158,26 @@ Roadmap::Tree Roadmap::search(const std::vector<Link>& starts, const std::vector
 
 // To nowhere: the foot is the node itself. The node has an edge that is not blocked.
 Roadmap::Link Roadmap::link_at_node(int node) const {
-  int h = at(fixed_->first_half_edge, node);
-  while (edge_blocked(at(fixed_->half_edges, h).edge)) ++h;
-  const HalfEdge& half = at(fixed_->half_edges, h);
-  const bool at_start = at(fixed_->axis.edges, half.edge).a == node;
-  return {{at(fixed_->axis.nodes_m, node)}, 0, half.edge, at_start ? 0 : half.length_m};
+  int h = item(fixed_->first_half_edge, node);
+  while (edge_blocked(item(fixed_->half_edges, h).edge)) ++h;
+  const HalfEdge& half = item(fixed_->half_edges, h);
+  const bool at_start = item(fixed_->axis.edges, half.edge).a == node;
+  return {{item(fixed_->axis.nodes_m, node)}, 0, half.edge, at_start ? 0 : half.length_m};
 }
 
 Roadmap::AlongRoads Roadmap::along_roads(int from_node, int to_node, Search search) const {
   const auto cut_off = [&](int node) {
-    for (int h = at(fixed_->first_half_edge, node); h < at(fixed_->first_half_edge, node + 1); ++h)
-      if (!edge_blocked(at(fixed_->half_edges, h).edge)) return false;
+    for (int h = item(fixed_->first_half_edge, node); h < item(fixed_->first_half_edge, node + 1);
+         ++h)
+      if (!edge_blocked(item(fixed_->half_edges, h).edge)) return false;
     return true;
   };
   if (from_node == to_node) return {0, 0};
   if (cut_off(from_node) || cut_off(to_node)) return {};
-  const Vector2d& to_m = at(fixed_->axis.nodes_m, to_node);
+  const Vector2d& to_m = item(fixed_->axis.nodes_m, to_node);
   const Tree tree = this->search({link_at_node(from_node)}, {link_at_node(to_node)},
                                  search == Search::a_star ? &to_m : nullptr);
-  return {at(tree.length_m, to_node), tree.nodes_searched};
+  return {item(tree.length_m, to_node), tree.nodes_searched};
 }
 
 // The shortest way that ends with one of the goal's links.
@@ -200,11 +196,11 @@ std::optional<std::vector<Vector2d>> Roadmap::trace(const Tree& tree,
     goal = to;
   };
   for (const Link& link : goals) {
-    const MedialAxis::Edge& e = at(fixed_->axis.edges, link.edge);
+    const MedialAxis::Edge& e = item(fixed_->axis.edges, link.edge);
     const Segment2 road = edge_segment(link.edge);
     const double rest_m = (road.b - road.a).norm() - link.along_m;
-    consider(at(tree.length_m, e.a) + link.along_m + link.length_m, e.a, nullptr, &link);
-    consider(at(tree.length_m, e.b) + rest_m + link.length_m, e.b, nullptr, &link);
+    consider(item(tree.length_m, e.a) + link.along_m + link.length_m, e.a, nullptr, &link);
+    consider(item(tree.length_m, e.b) + rest_m + link.length_m, e.b, nullptr, &link);
     for (const Link& from : starts)
       if (from.edge == link.edge)
         consider(from.length_m + std::abs(from.along_m - link.along_m) + link.length_m, -1, &from,
@@ -213,9 +209,9 @@ std::optional<std::vector<Vector2d>> Roadmap::trace(const Tree& tree,
   if (goal == nullptr) return std::nullopt;
 
   std::vector<Vector2d> backwards = goal->way_m;
-  for (int node = exit_node; node >= 0; node = at(tree.parent, node)) {
-    backwards.push_back(at(fixed_->axis.nodes_m, node));
-    if (at(tree.link, node) >= 0) start = &at(starts, at(tree.link, node));
+  for (int node = exit_node; node >= 0; node = item(tree.parent, node)) {
+    backwards.push_back(item(fixed_->axis.nodes_m, node));
+    if (item(tree.link, node) >= 0) start = &item(starts, item(tree.link, node));
   }
   backwards.insert(backwards.end(), start->way_m.rbegin(), start->way_m.rend());
   std::reverse(backwards.begin(), backwards.end());

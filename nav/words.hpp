@@ -24,6 +24,9 @@ inline std::string in_m2(double area_m2) {
 inline std::string in_words(PointMm p) {
   return "(" + decimal(to_m(p).x()) + ", " + decimal(to_m(p).y()) + ")";
 }
+inline std::string in_deg(double angle_deg) {
+  return decimal(angle_deg, 1) + " deg";
+}
 // "1 vertex", "3 vertices"
 inline std::string counted(int n, const char* one, const char* many) {
   return std::to_string(n) + " " + (n == 1 ? one : many);

@@ -17,13 +17,9 @@ using nav::PointMm;
 __extension__ using Int128 = __int128;
 __extension__ using UInt128 = unsigned __int128;
 
-int sign(std::int64_t value) {
-  return (value > 0) - (value < 0);
-}
-
 bool cross_properly(const Wall& u, const Wall& w) {
-  return sign(nav::side(u.a, u.b, w.a)) * sign(nav::side(u.a, u.b, w.b)) < 0 &&
-         sign(nav::side(w.a, w.b, u.a)) * sign(nav::side(w.a, w.b, u.b)) < 0;
+  return nav::sign(nav::side(u.a, u.b, w.a)) * nav::sign(nav::side(u.a, u.b, w.b)) < 0 &&
+         nav::sign(nav::side(w.a, w.b, u.a)) * nav::sign(nav::side(w.a, w.b, u.b)) < 0;
 }
 
 // On one line, with more than a point in common.

@@ -12,7 +12,7 @@ namespace {
 
 using nav::PointMm;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 struct Interval {
   double from_m, to_m;
@@ -24,14 +24,14 @@ struct Admitted {
   int count;
 };
 
-constexpr Admitted kAll{{{-kInfinity, kInfinity}, {}}, 1};
+constexpr Admitted kAll{{{-kInfinite, kInfinite}, {}}, 1};
 constexpr Admitted kNone{{}, 0};
 
 Admitted inside(double from_m, double to_m) {
   return {{{from_m, to_m}, {}}, 1};
 }
 Admitted outside(double from_m, double to_m) {
-  return {{{-kInfinity, from_m}, {to_m, kInfinity}}, 2};
+  return {{{-kInfinite, from_m}, {to_m, kInfinite}}, 2};
 }
 
 // How the wall lies to the viewpoint.
@@ -232,7 +232,7 @@ std::vector<WallPiece> Visibility::from(const Candidate& viewpoint) const {
 
 std::vector<WallPiece> Visibility::in_sight(PointMm viewpoint) const {
   Pieces pieces;
-  for (const SharePiece& piece : sight_.from(viewpoint, kInfinity)) {
+  for (const SharePiece& piece : sight_.from(viewpoint, kInfinite)) {
     const WallPiece in_metres = in_m(piece, walls_);
     if (in_metres.from_m < in_metres.to_m) pieces.push_back(in_metres);
   }

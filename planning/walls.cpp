@@ -27,13 +27,13 @@ Vector2d direction(const SegmentMm& s) {
 
 // The stretch of the edge that the border of an area, its ground on the left, runs along.
 Stretch shared(const SegmentMm& edge, const SegmentMm& border) {
-  constexpr Stretch kNothing{0, 0};
+  constexpr Stretch kNowhere{0, 0};
   const Vector2d along = direction(edge);
   const Vector2d right(along.y(), -along.x());
   const Vector2d first = nav::to_m(border.b) - nav::to_m(edge.a);  // Where it is first met.
   const Vector2d step = nav::to_m(border.a) - nav::to_m(border.b);
   const double start_m = first.dot(along), step_m = step.dot(along);
-  if (step_m <= 0) return kNothing;  // The ground lies on the obstacle's side.
+  if (step_m <= 0) return kNowhere;  // The ground lies on the obstacle's side.
   Stretch s{std::max(0.0, start_m), std::min(nav::length_m(edge.a, edge.b), start_m + step_m)};
 
   const double slope = step.dot(right) / step_m;
@@ -45,10 +45,10 @@ Stretch shared(const SegmentMm& edge, const SegmentMm& border) {
     const double far_m = start_m + (reach_m - first.dot(right)) / slope;
     s = {std::max(s.from_m, std::min(near_m, far_m)), std::min(s.to_m, std::max(near_m, far_m))};
   }
-  if (!(s.from_m < s.to_m)) return kNothing;
+  if (!(s.from_m < s.to_m)) return kNowhere;
   constexpr double kHair = 1e-6;
   for (const double at_m : {s.from_m, s.to_m})
-    if (off_m(at_m) < -kRoundingM - kHair || off_m(at_m) > reach_m + kHair) return kNothing;
+    if (off_m(at_m) < -kRoundingM - kHair || off_m(at_m) > reach_m + kHair) return kNowhere;
   return s;
 }
 

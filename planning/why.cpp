@@ -6,6 +6,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "hal/angles.hpp"
 #include "nav/words.hpp"
 
 namespace planning {
@@ -36,14 +37,6 @@ std::int64_t most_outward(const BoundaryVoxel& u, Voxel d) {
   for (const auto& [face, step] : kNormals)
     if ((u.faces & face) != 0) most = std::max(most, dot(step, d));
   return most;
-}
-
-double degrees(double angle_rad) {
-  return angle_rad * 180 / std::numbers::pi;
-}
-
-std::string in_deg(double angle_deg) {
-  return nav::decimal(angle_deg, 1) + " deg";
 }
 
 std::string blocked_text(const WhyView& why) {
@@ -88,7 +81,7 @@ WhyView why_view(const VoxelMap& map, const BoundaryVoxel& u, Voxel p, const Vie
   why.limits = limits;
   why.distance_m = distance * map.grid().voxel_m;
   const double cosine = static_cast<double>(most_outward(u, d)) / distance;
-  why.angle_deg = degrees(std::acos(std::clamp(cosine, -1.0, 1.0)));
+  why.angle_deg = hal::degrees(std::acos(std::clamp(cosine, -1.0, 1.0)));
   why.verdict = verdict_before_occlusion(u, p, rule);
   if (why.verdict != ViewVerdict::visible) return why;
   why.blocker = first_between(map, p, u.v);
@@ -106,7 +99,7 @@ BoundaryVoxel with_exposed_faces(const VoxelMap& map, Voxel u) {
 }
 
 std::string text(const WhyView& why) {
-  const std::string far = nav::in_m(why.distance_m) + " away", angle = in_deg(why.angle_deg);
+  const std::string far = nav::in_m(why.distance_m) + " away", angle = nav::in_deg(why.angle_deg);
   switch (why.verdict) {
     case ViewVerdict::too_far:
       return "out of range: " + far + ", the scanner reaches " + nav::in_m(why.limits.range_max_m);
@@ -117,7 +110,7 @@ std::string text(const WhyView& why) {
       return "faces away: the beam would come from behind (" + angle + " from the outward normal)";
     case ViewVerdict::grazing:
       return "too flat: the beam meets it at " + angle + " from the normal, the limit is " +
-             in_deg(why.limits.grazing_max_deg);
+             nav::in_deg(why.limits.grazing_max_deg);
     case ViewVerdict::sparse:
       return "too sparse: " + far + ", at " + angle + " from the normal, a scan puts fewer than " +
              nav::decimal(why.limits.density_min_ppm2, 0) + " points per m2 on it";

@@ -4,6 +4,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "hal/angles.hpp"
 #include "nav/words.hpp"
 
 namespace planning {
@@ -13,14 +14,6 @@ using Eigen::Vector2d;
 
 double cross(const Vector2d& a, const Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
-}
-
-double degrees(double angle_rad) {
-  return angle_rad * 180 / std::numbers::pi;
-}
-
-std::string in_deg(double angle_deg) {
-  return nav::decimal(angle_deg, 1) + " deg";
 }
 
 struct Meeting {
@@ -85,8 +78,8 @@ WhyWall why_wall(const Visibility& visibility, int wall, double at_m, const Cand
   why.excluded = outcome_at(visibility, wall, at_m, station);
   why.distance_m = way.norm();
   // The free side is on the right of a -> b.
-  why.angle_deg = degrees(std::atan2(std::abs(way.dot(along)), cross(along, way)));
-  why.heading_deg = degrees(
+  why.angle_deg = hal::degrees(std::atan2(std::abs(way.dot(along)), cross(along, way)));
+  why.heading_deg = hal::degrees(
       std::remainder(std::atan2(way.y(), way.x()) - station.heading_rad, 2 * std::numbers::pi));
   if (why.excluded != Excluded::occluded) return why;
   why.behind = nav::side(asked.a, asked.b, station.position) >= 0;
@@ -101,7 +94,7 @@ WhyWall why_wall(const Visibility& visibility, int wall, double at_m, const Cand
 
 std::string text(const WhyWall& why) {
   const std::string far = nav::in_m(why.distance_m) + " away";
-  const std::string angle = in_deg(why.angle_deg) + " from the wall's normal";
+  const std::string angle = nav::in_deg(why.angle_deg) + " from the wall's normal";
   if (!why.excluded) return "imaged: " + far + ", " + angle;
   switch (*why.excluded) {
     case Excluded::occluded:
@@ -113,11 +106,11 @@ std::string text(const WhyWall& why) {
              nav::in_m(why.limits.range_min_m) + " on";
     case Excluded::grazing:
       return "too flat: the beam meets the wall " + angle + ", the limit is " +
-             in_deg(why.limits.grazing_max_deg);
+             nav::in_deg(why.limits.grazing_max_deg);
     case Excluded::field_of_view:
-      return "outside the field of view: " + in_deg(std::abs(why.heading_deg)) + " to the " +
+      return "outside the field of view: " + nav::in_deg(std::abs(why.heading_deg)) + " to the " +
              (why.heading_deg >= 0 ? "left" : "right") + " of the heading, the limit is " +
-             in_deg(why.limits.fov_deg / 2);
+             nav::in_deg(why.limits.fov_deg / 2);
     default:
       return std::string(name(*why.excluded));  // Of a cover, not of one station.
   }

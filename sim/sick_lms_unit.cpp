@@ -18,7 +18,7 @@ namespace {
 
 constexpr hal::Duration kLatency = 1200us;  // As recorded of an LMS111.
 constexpr hal::Duration kStartLatency = 14ms;
-enum Kind { kAnswer, kScan = 1 << 20 };  // Of messages, for the fault `stuck`.
+enum Kind { kAnswerAfter, kScan = 1 << 20 };  // Of messages, for the fault `stuck`.
 
 double uniform(std::uint64_t seed, std::uint64_t number) {
   return static_cast<double>(mix(mix(seed) ^ ~number) >> 11) * 0x1p-53;
@@ -117,7 +117,7 @@ hal::Task<void> SickLmsUnit::listen() {
 hal::Task<void> SickLmsUnit::answer(const Message& message) {
   if (config_.only && message.dialect != *config_.only) co_return;
   dialect_ = message.dialect;
-  int kind = kAnswer;
+  int kind = kAnswerAfter;
   for (const char letter : message.name) kind = (kind * 31 + letter) & 0xFFFF;
   const bool starts = message.name == "LMCstartmeas";
   const Bytes bytes = reply(message);

@@ -30,7 +30,7 @@ constexpr int kRimPoints = 8;
 
 const double kTick_s = hal::seconds(World::kTick);
 
-boost::system::error_code error(boost::system::errc::errc_t code) {
+boost::system::error_code failed(boost::system::errc::errc_t code) {
   return boost::system::errc::make_error_code(code);
 }
 
@@ -70,7 +70,7 @@ std::optional<double> World::ground_within_step(const Eigen::Vector2d& W_point, 
 hal::Result<StandingPose> World::standing(const hal::Pose2& pose, double expected_ground_z_m,
                                           double radius_m) const {
   if (!pose.position_m.allFinite() || !std::isfinite(pose.heading_rad))
-    return error(boost::system::errc::invalid_argument);
+    return failed(boost::system::errc::invalid_argument);
   // The surface nearest to the expected height, not the roof of a shed; then what lies on it.
   const Eigen::Vector3d above(pose.position_m.x(), pose.position_m.y(),
                               expected_ground_z_m + kGroundReach_m);
@@ -79,10 +79,10 @@ hal::Result<StandingPose> World::standing(const hal::Pose2& pose, double expecte
     if (!base_m || std::abs(z_m - expected_ground_z_m) < std::abs(*base_m - expected_ground_z_m))
       base_m = z_m;
   const auto ground_m = base_m ? ground_within_step(pose.position_m, *base_m) : std::nullopt;
-  if (!ground_m) return error(boost::system::errc::address_not_available);
+  if (!ground_m) return failed(boost::system::errc::address_not_available);
   const double clear_m = scene_.clearance_m(pose.position_m, *ground_m + config_.step_max_m,
                                             *ground_m + config_.collision_height_m, radius_m);
-  if (clear_m < radius_m) return error(boost::system::errc::address_not_available);
+  if (clear_m < radius_m) return failed(boost::system::errc::address_not_available);
   return StandingPose{pose, *ground_m};
 }
 
@@ -98,7 +98,7 @@ hal::Result<void> World::put_robot(const hal::Pose2& pose, double expected_groun
 
 hal::Result<void> World::command(const hal::Twist& twist) {
   if (!std::isfinite(twist.forward_mps) || !std::isfinite(twist.turn_radps))
-    return error(boost::system::errc::invalid_argument);
+    return failed(boost::system::errc::invalid_argument);
   const bool pushes = blocked_direction_ * twist.forward_mps > 0 && !free_ahead(twist.forward_mps);
   const double turn_radps =
       std::clamp(twist.turn_radps, -config_.turn_max_radps, config_.turn_max_radps);
@@ -112,7 +112,7 @@ hal::Result<void> World::command(const hal::Twist& twist) {
   right_.target_mps = right_mps * scale;
   command_expires_ = ticks_ + std::lround(config_.command_expiry_s / kTick_s);
   if (left_.target_mps != 0 || right_.target_mps != 0) placed_scanner_.reset();
-  if (pushes) return error(boost::system::errc::io_error);
+  if (pushes) return failed(boost::system::errc::io_error);
   return {};
 }
 

@@ -21,16 +21,15 @@ vantage_together(vantage_drivers drivers
   "cia402_drive cia402_troubles sweep_scanner vn100"
   "cia402_bring_up modbus_client modbus_line nmea_gnss")
 vantage_together(vantage_sim sim
-  "flir_ptu_unit ground nmea_unit profile_caster reachable stream_wire"
-  "mesh placement power_units ray_bundle sim_clock unit_faults"
-  "cia402_unit gpsd_unit gs_usb_unit noise register_wire uart"
-  "datagram_wire ouster_unit scan velodyne_unit vn100_unit"
-  "can_wire hokuyo_unit modbus_server pan_motion scene witnessed_scanner"
-  "agilex_unit cast_ahead people sick_lms_unit surface_samples surface_truth"
-  "facets gnss_source position_tree ublox_unit usbip_server world")
+  "can_wire cast_ahead cia402_unit facets flir_ptu_unit gnss_source ground gs_usb_unit hokuyo_unit modbus_server noise
+   ouster_unit pan_motion people position_tree reachable register_wire scan scene sim_clock surface_samples
+   surface_truth uart ublox_unit unit_faults usbip_server velodyne_unit witnessed_scanner world"
+  "agilex_unit mesh placement power_units profile_caster sick_lms_unit stream_wire"
+  "datagram_wire ray_bundle vn100_unit"
+  "gpsd_unit"
+  "nmea_unit")
 vantage_together(vantage_backends mission
-  "main_links main_robot main_run main_scanner"
-  "main_gate main_hardware main_sim main_watch"
-  "main_units main_worker")
+  "main_gate main_hardware main_links main_robot main_scanner main_sim main_units main_worker"
+  "main_run main_watch")
 vantage_together(make_sites tools
   "make_sites make_sites_courtyard make_sites_model make_sites_shapes make_sites_site")

@@ -22,7 +22,7 @@ struct Element {
 
 enum class Format { unknown, ascii, little, big };
 
-struct Header {
+struct PlyHeader {
   Format format = Format::unknown;
   std::vector<Element> elements;
   int lines{};
@@ -61,7 +61,7 @@ std::string read_property(std::string_view line, Element& element) {
   return {};
 }
 
-std::string read_header_line(std::string_view line, Header& header) {
+std::string read_header_line(std::string_view line, PlyHeader& header) {
   const std::string_view key = fields::take_word(line);
   if (key == "comment" || key == "obj_info" || key.empty()) return {};
   if (key == "format") {
@@ -89,8 +89,8 @@ std::string read_header_line(std::string_view line, Header& header) {
   return read_property(line, header.elements.back());
 }
 
-CloudResult<Header> read_header(fields::Lines& lines, std::string_view file) {
-  Header header;
+CloudResult<PlyHeader> read_ply_header(fields::Lines& lines, std::string_view file) {
+  PlyHeader header;
   std::string_view line;
   lines.next(line);  // "ply"
   while (lines.next(line)) {
@@ -125,7 +125,7 @@ CloudResult<std::array<std::size_t, 3>> xyz_of(const Element& vertex, std::strin
   return xyz;
 }
 
-CloudError cut_short(std::string_view file, std::uint64_t have, std::uint64_t want) {
+CloudError ply_cut_short(std::string_view file, std::uint64_t have, std::uint64_t want) {
   return {std::string(file), 0,
           fmt::format("cut short: {} of {} points are there; copy the file again", have, want)};
 }
@@ -151,7 +151,7 @@ bool read_row(std::string_view& bytes, const Element& element, bool swap, const 
   return true;
 }
 
-CloudResult<Points> read_binary(std::string_view bytes, const Header& header,
+CloudResult<Points> read_binary(std::string_view bytes, const PlyHeader& header,
                                 std::string_view file) {
   const bool swap = header.format == Format::big;
   for (const Element& element : header.elements) {
@@ -171,7 +171,7 @@ CloudResult<Points> read_binary(std::string_view bytes, const Header& header,
         for (std::size_t axis = 0; axis < 3; ++axis)
           if (at == xyz[axis]) point[static_cast<Eigen::Index>(axis)] = static_cast<float>(value);
       });
-      if (!whole) return cut_short(file, i, element.count);
+      if (!whole) return ply_cut_short(file, i, element.count);
       if (vertices) points.push_back(point);
     }
     if (vertices) return points;
@@ -179,7 +179,8 @@ CloudResult<Points> read_binary(std::string_view bytes, const Header& header,
   return CloudError{std::string(file), 0, "no element vertex: this PLY holds no points"};
 }
 
-CloudResult<Points> read_ascii(fields::Lines lines, const Header& header, std::string_view file) {
+CloudResult<Points> read_ascii(fields::Lines lines, const PlyHeader& header,
+                               std::string_view file) {
   for (const Element& element : header.elements) {
     std::string_view line;
     if (element.name != "vertex") {
@@ -191,7 +192,7 @@ CloudResult<Points> read_ascii(fields::Lines lines, const Header& header, std::s
     if (!xyz) return xyz.error();
     Points points;
     for (std::uint64_t i = 0; i < element.count; ++i) {
-      if (!lines.next(line)) return cut_short(file, i, element.count);
+      if (!lines.next(line)) return ply_cut_short(file, i, element.count);
       const auto row = fields::words(line);
       Eigen::Vector3f point;
       for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -214,7 +215,7 @@ CloudResult<Points> read_ascii(fields::Lines lines, const Header& header, std::s
 
 CloudResult<Points> parse_ply_cloud(std::string_view bytes, std::string_view file) {
   fields::Lines lines(bytes);
-  const auto header = read_header(lines, file);
+  const auto header = read_ply_header(lines, file);
   if (!header) return header.error();
   auto points = header->format == Format::ascii ? read_ascii(lines, *header, file)
                                                 : read_binary(lines.rest(), *header, file);

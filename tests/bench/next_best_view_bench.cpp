@@ -34,12 +34,12 @@ struct Question {
 };
 
 // A made-up fort of 300 x 300 m, scanned with a coarse scanner, so that much is left.
-struct Site {
+struct ViewSite {
   worlds::World world = worlds::fort(300, 1);
   worlds::Random random{3};
   VoxelMap map;
 
-  explicit Site(double voxel_m)
+  explicit ViewSite(double voxel_m)
       : map({{0, 0, -voxel_m / 2},
              voxel_m,
              static_cast<int>(300 / voxel_m),
@@ -64,7 +64,7 @@ struct Site {
 const Question& question(std::int64_t voxel_cm) {
   static std::map<std::int64_t, Question> questions;
   if (!questions.contains(voxel_cm)) {
-    Site site(static_cast<double>(voxel_cm) / 100);
+    ViewSite site(static_cast<double>(voxel_cm) / 100);
     site.scan_stations(7);
     questions.emplace(voxel_cm, site.question());
   }
@@ -214,7 +214,7 @@ BENCHMARK(TallyByWalking)
 // The fort after 20 stations, and after each of 9 next best views.
 const std::vector<Question>& mission() {
   static const std::vector<Question> questions = [] {
-    Site site(1);
+    ViewSite site(1);
     site.scan_stations(20);
     std::vector<Question> result{site.question()};
     while (result.size() < 10) {

@@ -14,28 +14,28 @@ namespace {
 constexpr double kRadiusM = 0.5;
 constexpr int kSmall = 150, kLarge = 1400;  // Obstacles; 100 come to about 720 edges.
 
-struct Site {
+struct RoadSite {
   double side_m;
   nav::FreeArea area;
 };
 
-const Site& site(int obstacles) {
+const RoadSite& site(int obstacles) {
   static const auto make = [](int count) {
     support::Dice dice(1);
     const double side_m = 300 * std::sqrt(count / 150.0);
     const support::SiteSize size{side_m, count, 10, 12};
-    return Site{side_m, support::random_area(dice, size, kRadiusM)};
+    return RoadSite{side_m, support::random_area(dice, size, kRadiusM)};
   };
-  static const Site small = make(kSmall);
-  static const Site large = make(kLarge);
+  static const RoadSite small = make(kSmall);
+  static const RoadSite large = make(kLarge);
   return obstacles == kSmall ? small : large;
 }
 
-void count_edges(benchmark::State& state, const Site& s) {
+void count_edges(benchmark::State& state, const RoadSite& s) {
   state.counters["edges"] = static_cast<double>(nav::edges(s.area.drivable).size());
 }
 
-std::vector<Eigen::Vector2d> stations(const Site& s, int count) {
+std::vector<Eigen::Vector2d> stations(const RoadSite& s, int count) {
   support::Dice dice(2);
   std::vector<Eigen::Vector2d> points;
   for (int i = 0; i < count; ++i)
@@ -44,7 +44,7 @@ std::vector<Eigen::Vector2d> stations(const Site& s, int count) {
 }
 
 void roadmap_build(benchmark::State& state) {
-  const Site& s = site(static_cast<int>(state.range(0)));
+  const RoadSite& s = site(static_cast<int>(state.range(0)));
   for (auto _ : state) benchmark::DoNotOptimize(nav::Roadmap::build(s.area, kRadiusM));
   count_edges(state, s);
 }
@@ -54,7 +54,7 @@ BENCHMARK(roadmap_build)->Arg(kSmall)->Arg(kLarge)->Unit(benchmark::kMillisecond
 // diagram is timed; dropping what lies in obstacles or is too narrow would come on top.
 void roadmap_build_by_points(benchmark::State& state) {
   constexpr double kStepM = 0.1;
-  const Site& s = site(static_cast<int>(state.range(0)));
+  const RoadSite& s = site(static_cast<int>(state.range(0)));
   std::vector<boost::polygon::point_data<std::int32_t>> points;
   for (const nav::SegmentMm& e : nav::edges(s.area.drivable)) {
     const int pieces = std::max(1, static_cast<int>(std::ceil(nav::length_m(e.a, e.b) / kStepM)));
@@ -75,14 +75,14 @@ void roadmap_build_by_points(benchmark::State& state) {
 BENCHMARK(roadmap_build_by_points)->Arg(kSmall)->Arg(kLarge)->Unit(benchmark::kMillisecond);
 
 void medial_axis(benchmark::State& state) {
-  const Site& s = site(static_cast<int>(state.range(0)));
+  const RoadSite& s = site(static_cast<int>(state.range(0)));
   for (auto _ : state) benchmark::DoNotOptimize(nav::medial_axis(s.area.drivable, {}));
   count_edges(state, s);
 }
 BENCHMARK(medial_axis)->Arg(kSmall)->Arg(kLarge)->Unit(benchmark::kMillisecond);
 
 void noding(benchmark::State& state) {
-  const Site& s = site(static_cast<int>(state.range(0)));
+  const RoadSite& s = site(static_cast<int>(state.range(0)));
   const auto outline = nav::edges(s.area.drivable);
   for (auto _ : state) benchmark::DoNotOptimize(nav::node_outlines(outline));
   count_edges(state, s);
@@ -91,7 +91,7 @@ BENCHMARK(noding)->Arg(kSmall)->Arg(kLarge)->Unit(benchmark::kMillisecond);
 
 // From node to node along the roads, the same pairs for both searches.
 void search_roads(benchmark::State& state, nav::Roadmap::Search search) {
-  const Site& s = site(static_cast<int>(state.range(0)));
+  const RoadSite& s = site(static_cast<int>(state.range(0)));
   const nav::Roadmap roadmap = nav::Roadmap::build(s.area, kRadiusM);
   const int nodes = static_cast<int>(roadmap.graph().nodes_m.size());
   support::Dice dice(4);
@@ -121,7 +121,7 @@ BENCHMARK(along_roads)->Arg(kSmall)->Arg(kLarge)->Unit(benchmark::kMicrosecond);
 BENCHMARK(along_roads_by_dijkstra)->Arg(kSmall)->Arg(kLarge)->Unit(benchmark::kMicrosecond);
 
 void route(benchmark::State& state) {
-  const Site& s = site(static_cast<int>(state.range(0)));
+  const RoadSite& s = site(static_cast<int>(state.range(0)));
   const auto smoothing = state.range(1) == 0 ? nav::Smoothing::none : nav::Smoothing::shortcut;
   const nav::Roadmap roadmap = nav::Roadmap::build(s.area, kRadiusM);
   const auto points = stations(s, 20);
@@ -135,7 +135,7 @@ void route(benchmark::State& state) {
 BENCHMARK(route)->ArgsProduct({{kSmall, kLarge}, {0, 1}})->Unit(benchmark::kMillisecond);
 
 void all_pairs_of_26(benchmark::State& state) {
-  const Site& s = site(kSmall);
+  const RoadSite& s = site(kSmall);
   const auto smoothing = state.range(0) == 0 ? nav::Smoothing::none : nav::Smoothing::shortcut;
   const nav::Roadmap roadmap = nav::Roadmap::build(s.area, kRadiusM);
   const auto points = stations(s, 26);
@@ -145,7 +145,7 @@ BENCHMARK(all_pairs_of_26)->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
 
 // An obstacle found underway closes roads; the reference makes the roadmap anew.
 void block(benchmark::State& state) {
-  const Site& s = site(static_cast<int>(state.range(0)));
+  const RoadSite& s = site(static_cast<int>(state.range(0)));
   nav::Roadmap roadmap = nav::Roadmap::build(s.area, kRadiusM);
   const auto points = stations(s, 1000);
   std::size_t i = 0;
@@ -161,7 +161,7 @@ void block(benchmark::State& state) {
   }
 }
 void block_by_rebuilding(benchmark::State& state) {
-  const Site& s = site(static_cast<int>(state.range(0)));
+  const RoadSite& s = site(static_cast<int>(state.range(0)));
   const auto points = stations(s, 1000);
   std::size_t i = 0;
   for (auto _ : state) {

@@ -40,7 +40,7 @@ struct Mission {
   }
 };
 
-const Mission& mission() {
+const Mission& scanned_fort() {
   static const Mission instance;
   return instance;
 }
@@ -53,7 +53,7 @@ VoxelGrid grid(const benchmark::State& state) {
 }
 
 InsertConfig with_threads(const benchmark::State& state) {
-  InsertConfig config = mission().config;
+  InsertConfig config = scanned_fort().config;
   config.threads = static_cast<int>(state.range(1));
   return config;
 }
@@ -125,20 +125,22 @@ VoxelMap pass(benchmark::State& state, int nz_kept, Stopwatch& watch, const Inse
   VoxelMap map(grid(state));
   for (auto _ : state) {
     map = VoxelMap(grid(state), nz_kept);
-    for (std::size_t i = 0; i < mission().scans.size(); ++i) watch.time(i, [&] { insert(map, i); });
+    for (std::size_t i = 0; i < scanned_fort().scans.size(); ++i)
+      watch.time(i, [&] { insert(map, i); });
   }
   return map;
 }
 
 std::size_t all_beams() {
-  return mission().scans.size() * mission().scans.front().pattern.beams();
+  return scanned_fort().scans.size() * scanned_fort().scans.front().pattern.beams();
 }
 
 // A good plain walk: integers, dense bytes, stops at the box.
 void WalkEveryBeam(benchmark::State& state) {
   Stopwatch watch;
   VoxelMap map = pass(state, 0, watch, [](VoxelMap& to, std::size_t i) {
-    oracle::insert_densely(to, mission().scans[i], mission().poses[i], mission().config);
+    oracle::insert_densely(to, scanned_fort().scans[i], scanned_fort().poses[i],
+                           scanned_fort().config);
   });
   walked[state.range(0)] = watch.per_beam(all_beams());
   walked_map.insert_or_assign(state.range(0), std::move(map));
@@ -154,7 +156,7 @@ BENCHMARK(WalkEveryBeam)
 
 // The end points of every other column of the first scan, in voxels: 1.35 M beams.
 octomap::Pointcloud end_points(const planning::BeamFan& fan, const planning::BeamReach& reach) {
-  const hal::ScanPattern& pattern = mission().scans.front().pattern;
+  const hal::ScanPattern& pattern = scanned_fort().scans.front().pattern;
   octomap::Pointcloud cloud;
   for (std::uint32_t c = 0; c < pattern.columns; c += 2)
     for (std::uint32_t r = 0; r < pattern.rows; ++r) {
@@ -170,7 +172,7 @@ octomap::Pointcloud end_points(const planning::BeamFan& fan, const planning::Bea
 
 // The same beams into OctoMap, as its manual does it.
 void InsertIntoOctomap(benchmark::State& state) {
-  const Mission& m = mission();
+  const Mission& m = scanned_fort();
   const planning::BeamFan fan(grid(state), m.scans[0], m.poses[0]);
   const octomap::Pointcloud cloud =
       end_points(fan, planning::beam_reach(m.scans[0], grid(state), m.poses[0], fan, m.config));
@@ -201,7 +203,7 @@ void InsertScans(benchmark::State& state) {
   Stopwatch watch;
   const InsertConfig config = with_threads(state);
   const VoxelMap map = pass(state, 0, watch, [&](VoxelMap& to, std::size_t i) {
-    to.insert(mission().scans[i], mission().poses[i], config);
+    to.insert(scanned_fort().scans[i], scanned_fort().poses[i], config);
   });
   const std::int64_t cm = state.range(0);
   const Seconds per_beam = watch.per_beam(all_beams());
@@ -228,7 +230,7 @@ void InsertScansKeepingLayersAbove(benchmark::State& state) {
   const InsertConfig config = with_threads(state);
   const int nz_kept = static_cast<int>(103 / grid(state).voxel_m);
   const VoxelMap map = pass(state, nz_kept, watch, [&](VoxelMap& to, std::size_t i) {
-    to.insert(mission().scans[i], mission().poses[i], config);
+    to.insert(scanned_fort().scans[i], scanned_fort().poses[i], config);
   });
   tell(state, watch.per_beam(all_beams()));
   state.counters["bytes/voxel"] =
@@ -248,8 +250,8 @@ void CountBeamsForFoliage(benchmark::State& state) {
   const VoxelMap map(grid(state));
   planning::BeamCounts counts(map);
   for (auto _ : state)
-    for (std::size_t i = 0; i < mission().scans.size(); ++i)
-      watch.time(i, [&] { counts.add(mission().scans[i], mission().poses[i], config); });
+    for (std::size_t i = 0; i < scanned_fort().scans.size(); ++i)
+      watch.time(i, [&] { counts.add(scanned_fort().scans[i], scanned_fort().poses[i], config); });
   tell(state, watch.per_beam(all_beams()));
   state.counters["bytes/voxel"] =
       static_cast<double>(counts.storage_bytes()) / static_cast<double>(map.grid().size());
@@ -257,7 +259,7 @@ void CountBeamsForFoliage(benchmark::State& state) {
 BENCHMARK(CountBeamsForFoliage)
     ->ArgNames({"voxel_cm", "threads"})
     ->ArgsProduct({{100, 50}, {1, 2}})
-    ->Iterations(2)
+    ->Iterations(7)
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime();
 

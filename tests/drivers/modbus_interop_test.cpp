@@ -176,7 +176,7 @@ hal::Task<void> pump(hal::ByteStream& from, hal::ByteStream& to) {
   }
 }
 
-std::uint16_t free_port() {
+std::uint16_t free_tcp_port() {
   asio::io_context io;
   asio::ip::tcp::acceptor acceptor(io, {asio::ip::address_v4::loopback(), 0});
   return acceptor.local_endpoint().port();
@@ -191,7 +191,7 @@ TEST(Pymodbus, AnswersOurDriverOverTcpAndASerialLine) {
     GTEST_SKIP() << "pymodbus is not installed (apt-get install python3-pymodbus "
                     "python3-serial-asyncio)";
   RealTime time;
-  const std::uint16_t port = free_port();
+  const std::uint16_t port = free_tcp_port();
   // A serial cable: two ends, joined in the middle.
   const test::TempFolder folder;
   const std::string our_path = folder.path() / "ours", their_path = folder.path() / "theirs";

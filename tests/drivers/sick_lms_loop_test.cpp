@@ -11,7 +11,7 @@ namespace {
 using namespace std::chrono_literals;
 using drivers_test::FailsOnce;
 using sim::UnitFault;
-constexpr double kDeg = std::numbers::pi / 180;
+constexpr double kDegree = std::numbers::pi / 180;
 
 SickLmsConfig lms111() {
   return {};
@@ -50,8 +50,8 @@ TEST_F(SickLmsLoop, StartsIdentifiesAndMeasures) {
   const auto profiles = take(200);
   ASSERT_EQ(profiles.size(), 200U);
   EXPECT_EQ(profiles[0].ranges_m.size(), 541U);
-  EXPECT_NEAR(profiles[0].angle_first_rad, -135 * kDeg, 1e-9);
-  EXPECT_NEAR(profiles[0].angle_step_rad, 0.5 * kDeg, 1e-9);
+  EXPECT_NEAR(profiles[0].angle_first_rad, -135 * kDegree, 1e-9);
+  EXPECT_NEAR(profiles[0].angle_step_rad, 0.5 * kDegree, 1e-9);
   EXPECT_NEAR(profiles[0].beam_period_s, 0.02 / 720, 1e-9);
   EXPECT_EQ(device->counts().lost, 0U);
   EXPECT_EQ(device->counts().repeated, 1U);  // As the real one does now and then.
@@ -70,7 +70,7 @@ TEST_F(SickLmsLoop, MeasuresAsAnLms5xxAcrossTheFarWall) {
   const auto profiles = take(20);
   ASSERT_EQ(profiles.size(), 20U);
   EXPECT_EQ(profiles[0].ranges_m.size(), 1140U);
-  EXPECT_NEAR(profiles[0].angle_first_rad, -95 * kDeg, 1e-9);
+  EXPECT_NEAR(profiles[0].angle_first_rad, -95 * kDegree, 1e-9);
 }
 
 TEST_F(SickLmsLoop, SendsRemissionWhenAsked) {
@@ -176,12 +176,12 @@ TEST_F(SickLmsLoop, WaitsForAScannerThatIsSwitchedOnLater) {
   EXPECT_EQ(told(*device), "");
 }
 
-struct FaultCase {
+struct LmsFaultCase {
   sim::FaultSetting setting;
   std::string trouble;
 };
 
-class SickLmsFault : public SickLmsLoop, public testing::WithParamInterface<FaultCase> {};
+class SickLmsFault : public SickLmsLoop, public testing::WithParamInterface<LmsFaultCase> {};
 
 TEST_P(SickLmsFault, IsNamedAndEndsWithIt) {
   build();
@@ -201,14 +201,14 @@ TEST_P(SickLmsFault, IsNamedAndEndsWithIt) {
 
 INSTANTIATE_TEST_SUITE_P(
     All, SickLmsFault,
-    testing::Values(FaultCase{{UnitFault::off, 0}, "scans stopped"},
-                    FaultCase{{UnitFault::stuck, 0}, "same scan again and again"},
-                    FaultCase{{UnitFault::garbage, 0}, "not CoLa"},
-                    FaultCase{{UnitFault::wrong, 0.5}, "settings differ"},
-                    FaultCase{{UnitFault::slow, 3}, "scans too slow"},
-                    FaultCase{{UnitFault::delayed, 0.5}, "scans come late"},
-                    FaultCase{{UnitFault::intermittent, 0.4}, "scans get lost"},
-                    FaultCase{{UnitFault::duplicated_reordered, 0}, "scans out of order"}),
+    testing::Values(LmsFaultCase{{UnitFault::off, 0}, "scans stopped"},
+                    LmsFaultCase{{UnitFault::stuck, 0}, "same scan again and again"},
+                    LmsFaultCase{{UnitFault::garbage, 0}, "not CoLa"},
+                    LmsFaultCase{{UnitFault::wrong, 0.5}, "settings differ"},
+                    LmsFaultCase{{UnitFault::slow, 3}, "scans too slow"},
+                    LmsFaultCase{{UnitFault::delayed, 0.5}, "scans come late"},
+                    LmsFaultCase{{UnitFault::intermittent, 0.4}, "scans get lost"},
+                    LmsFaultCase{{UnitFault::duplicated_reordered, 0}, "scans out of order"}),
     [](const auto& each) {
       std::string name = sim::to_text(each.param.setting);
       name = name.substr(0, name.find(':'));

@@ -16,7 +16,7 @@ namespace {
 using namespace std::chrono_literals;
 using Eigen::Vector3d;
 using sim::UnitFault;
-constexpr double kDeg = std::numbers::pi / 180;
+constexpr double kRadPerDeg = std::numbers::pi / 180;
 
 // An LMS111 that looks up, on an E46-70: half a circle at 25 deg/s shows all.
 struct Setting {
@@ -27,14 +27,14 @@ struct Setting {
   sim::FlirPtuUnitConfig ptu_unit;
 
   Setting() {
-    ptu.acceleration_radps2 = 60 * kDeg;
+    ptu.acceleration_radps2 = 60 * kRadPerDeg;
     sweep.acceleration_radps2 = ptu.acceleration_radps2;
     sweep.mount.P_offset_m = {0.08, 0.01, 0.12};
-    sweep.mount.tilt_rad = 90 * kDeg;
-    sweep.mount.roll_rad = 1 * kDeg;
-    sweep.mount.yaw_rad = -0.5 * kDeg;
-    sweep.field.elevation_min_rad = -44 * kDeg;
-    sweep.field.azimuth_step_rad = 0.5 * kDeg;
+    sweep.mount.tilt_rad = 90 * kRadPerDeg;
+    sweep.mount.roll_rad = 1 * kRadPerDeg;
+    sweep.mount.yaw_rad = -0.5 * kRadPerDeg;
+    sweep.field.elevation_min_rad = -44 * kRadPerDeg;
+    sweep.field.azimuth_step_rad = 0.5 * kRadPerDeg;
     lms_unit.T_P_L = sweep.mount.T_P_L();
     lms_unit.ranges.range_min_m = 0.1;
     lms_unit.ranges.range_max_m = 20;
@@ -162,7 +162,7 @@ TEST_F(SweepLoop, ScansAsAnLms511WhoseTelegramsComeATurnLate) {
   setting.lms.settings.resolution_1e4deg = 5000;
   setting.lms.settings.start_1e4deg = -50000;
   setting.lms.settings.stop_1e4deg = 1850000;
-  setting.sweep.field.elevation_min_rad = -4 * kDeg;
+  setting.sweep.field.elevation_min_rad = -4 * kRadPerDeg;
   build(setting);
   const auto cloud = scan();
   ASSERT_TRUE(cloud) << told_all();
@@ -172,7 +172,7 @@ TEST_F(SweepLoop, ScansAsAnLms511WhoseTelegramsComeATurnLate) {
 TEST_F(SweepLoop, StopAndGoIsTrueToAStep) {
   Setting setting;
   setting.sweep.stop_and_go = true;
-  setting.sweep.field.azimuth_step_rad = 5 * kDeg;
+  setting.sweep.field.azimuth_step_rad = 5 * kRadPerDeg;
   build(setting);
   const auto cloud = scan();
   ASSERT_TRUE(cloud) << told_all();
@@ -182,7 +182,7 @@ TEST_F(SweepLoop, StopAndGoIsTrueToAStep) {
 
 TEST_F(SweepLoop, AMountThatIsNotAsCalibratedShows) {
   Setting setting;
-  setting.sweep.mount.roll_rad += 0.5 * kDeg;
+  setting.sweep.mount.roll_rad += 0.5 * kRadPerDeg;
   build(setting);
   const auto cloud = scan();
   ASSERT_TRUE(cloud) << told_all();
@@ -191,7 +191,7 @@ TEST_F(SweepLoop, AMountThatIsNotAsCalibratedShows) {
 
 TEST_F(SweepLoop, RefusesAFieldThatTheMountCannotGive) {
   Setting setting;
-  setting.sweep.field.elevation_min_rad = -60 * kDeg;
+  setting.sweep.field.elevation_min_rad = -60 * kRadPerDeg;
   build(setting);
   EXPECT_EQ(scan().error(), std::errc::invalid_argument);
   EXPECT_NE(scanner->problem().find("tilt the scanner"), std::string::npos) << told_all();

@@ -5,7 +5,7 @@
 namespace links_test {
 namespace {
 
-const bool kHeld =
+const bool kRealHeld =
     hold<StreamRig>("Tcp", stream_promises(), make_tcp_rig) &&
     hold<StreamRig>("SerialPort", stream_promises(), make_serial_rig) &&
     hold<DatagramRig>("Udp", datagram_promises(), make_udp_rig) &&

@@ -86,7 +86,7 @@ class RegisterTwin final : public RegisterRig {
   sim::RegisterWire wire_{loop_.clock(), unit_};
 };
 
-const bool kHeld =
+const bool kTwinsHeld =
     hold<CanRig>("CanTwin", can_promises(), [] { return std::make_unique<CanTwin>(0); }) &&
     hold<CanRig>("CanTwin500k", can_promises(),
                  [] { return std::make_unique<CanTwin>(500'000); }) &&

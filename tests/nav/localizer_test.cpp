@@ -17,7 +17,7 @@
 namespace {
 
 using hal::kDeg;
-constexpr double kStep_s = 0.05;
+constexpr double kTick_s = 0.05;
 
 // The true errors of the devices; the filter is told the sigmas, not the values.
 struct Errors {
@@ -33,9 +33,9 @@ struct Errors {
 };
 
 // A process that forgets itself over `length`.
-class Wander {
+class RandomDrive {
  public:
-  Wander(double sigma, double length) : sigma_(sigma), length_(length) {}
+  RandomDrive(double sigma, double length) : sigma_(sigma), length_(length) {}
   double step(double by, std::mt19937_64& random) {
     const double kept = fresh_ ? 0 : std::exp(-by / length_);
     fresh_ = false;
@@ -62,7 +62,7 @@ class World {
   // Drives (or stands) for a while; the hook may spoil a fix.
   void run(nav::Localizer& filter, double forward_mps, double turn_radps, double span_s,
            const std::function<void(hal::GnssFix&)>& spoil = {}) {
-    const int steps = static_cast<int>(std::lround(span_s / kStep_s));
+    const int steps = static_cast<int>(std::lround(span_s / kTick_s));
     for (int i = 0; i < steps; ++i) {
       step(filter, forward_mps, turn_radps);
       if (++count_ % errors_.fix_every == 0) fix(filter, spoil);
@@ -77,9 +77,9 @@ class World {
 
  private:
   void step(nav::Localizer& filter, double forward_mps, double turn_radps) {
-    now_ += hal::from_seconds(kStep_s);
-    const double half_m = 0.3 * turn_radps * kStep_s;
-    const double left_m = forward_mps * kStep_s - half_m, right_m = left_m + 2 * half_m;
+    now_ += hal::from_seconds(kTick_s);
+    const double half_m = 0.3 * turn_radps * kTick_s;
+    const double left_m = forward_mps * kTick_s - half_m, right_m = left_m + 2 * half_m;
     const double slip_left = left_slip_.step(std::abs(left_m), random_);
     const double slip_right = right_slip_.step(std::abs(right_m), random_);
     const double moved_left_m = left_m * (1 - slip_left),
@@ -91,12 +91,12 @@ class World {
     truth.heading_rad += turn_rad;
     if (errors_.gyro_works)
       filter.predict(hal::ImuSample{
-          now_, turn_rad / kStep_s + errors_.gyro_bias_radps + normal(errors_.gyro_sigma_radps)});
+          now_, turn_rad / kTick_s + errors_.gyro_bias_radps + normal(errors_.gyro_sigma_radps)});
     filter.predict(hal::WheelTravel{now_, left_m, right_m});
   }
 
   void fix(nav::Localizer& filter, const std::function<void(hal::GnssFix&)>& spoil) {
-    const double span_s = kStep_s * errors_.fix_every;
+    const double span_s = kTick_s * errors_.fix_every;
     const double white_m = errors_.gnss_sigma_m * std::sqrt(1 - errors_.wander_share);
     const Eigen::Vector2d error(wander_x_.step(span_s, random_) + normal(white_m),
                                 wander_y_.step(span_s, random_) + normal(white_m));
@@ -108,7 +108,7 @@ class World {
   Errors errors_;
   std::mt19937_64 random_;
   boost::random::normal_distribution<double> normal_;
-  Wander left_slip_, right_slip_, wander_x_, wander_y_;
+  RandomDrive left_slip_, right_slip_, wander_x_, wander_y_;
   hal::Time now_{};
   int count_ = 0;
 };

@@ -19,12 +19,12 @@ std::int64_t below(Random& random, std::int64_t n) {
   return static_cast<std::int64_t>(random() % static_cast<std::uint64_t>(n));
 }
 
-Ring box(std::int64_t x0, std::int64_t y0, std::int64_t x1, std::int64_t y1) {
+Ring box_mm(std::int64_t x0, std::int64_t y0, std::int64_t x1, std::int64_t y1) {
   return {{x0, y0}, {x1, y0}, {x1, y1}, {x0, y1}};
 }
 
 Polygons box_polygon(std::int64_t x0, std::int64_t y0, std::int64_t x1, std::int64_t y1) {
-  return {{box(x0, y0, x1, y1), {}}};
+  return {{box_mm(x0, y0, x1, y1), {}}};
 }
 
 // Vertices on a coarse grid, so that they coincide, touch and align often; with repeated vertices
@@ -232,8 +232,8 @@ TEST(Polygons, HoleThatTouchesItsOutlineStaysAHole) {
 }
 
 TEST(Polygons, IslandInAHoleIsAPolygonOfItsOwn) {
-  const Polygons shape =
-      normalise({box(0, 0, 90, 90), box(10, 10, 80, 80), box(20, 20, 70, 70), box(30, 30, 60, 60)});
+  const Polygons shape = normalise({box_mm(0, 0, 90, 90), box_mm(10, 10, 80, 80),
+                                    box_mm(20, 20, 70, 70), box_mm(30, 30, 60, 60)});
   ASSERT_EQ(shape.size(), 2u);
   EXPECT_EQ(shape[0].holes.size(), 1u);
   EXPECT_EQ(shape[1].holes.size(), 1u);
@@ -245,7 +245,7 @@ TEST(Polygons, IslandInAHoleIsAPolygonOfItsOwn) {
 }
 
 TEST(Polygons, InsideIsOnTheLeftOfEveryEdge) {
-  const Polygons shape = normalise({box(0, 0, 90, 90), box(10, 10, 80, 80)});
+  const Polygons shape = normalise({box_mm(0, 0, 90, 90), box_mm(10, 10, 80, 80)});
   for (const SegmentMm& e : edges(shape)) {
     const PointMm d = e.b - e.a;
     const std::int64_t length = std::abs(d.x) + std::abs(d.y);  // Axis-parallel.
@@ -256,8 +256,8 @@ TEST(Polygons, InsideIsOnTheLeftOfEveryEdge) {
 }
 
 TEST(Polygons, SliversAreDropped) {
-  EXPECT_TRUE(normalise({box(0, 0, 1000, 1)}).empty());
-  EXPECT_EQ(normalise({box(0, 0, 1000, 3)}).size(), 1u);
+  EXPECT_TRUE(normalise({box_mm(0, 0, 1000, 1)}).empty());
+  EXPECT_EQ(normalise({box_mm(0, 0, 1000, 3)}).size(), 1u);
 }
 
 TEST(Polygons, WithVerticesCutsAnEdgeAtThePoint) {

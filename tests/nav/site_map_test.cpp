@@ -23,7 +23,7 @@ using Metres = std::vector<Eigen::Vector2d>;
 constexpr double kMarginM = 30;
 
 // Closed, counter-clockwise.
-Metres box(double x0, double y0, double x1, double y1) {
+Metres rectangle(double x0, double y0, double x1, double y1) {
   return {{x0, y0}, {x1, y0}, {x1, y1}, {x0, y1}, {x0, y0}};
 }
 
@@ -67,10 +67,10 @@ std::vector<std::string> texts(const RepairedSite& site) {
 }
 
 RawFeature house() {
-  return feature(Role::obstacle, "house", {box(10, 10, 20, 20)});
+  return feature(Role::obstacle, "house", {rectangle(10, 10, 20, 20)});
 }
 RawFeature fence() {
-  return feature(Role::boundary, "fence", {box(0, 0, 100, 100)});
+  return feature(Role::boundary, "fence", {rectangle(0, 0, 100, 100)});
 }
 
 TEST(RepairSite, CleanMapNeedsNoRepair) {
@@ -119,7 +119,7 @@ INSTANTIATE_TEST_SUITE_P(
              {{{10, 10}, {20, 10}, {20, 20}, {10, 20}, {10, 10}, {10, 10}}},
              {"ring 0 has 1 repeated vertex; dropped"}},
         Slip{"clockwise",
-             {reversed(box(10, 10, 20, 20))},
+             {reversed(rectangle(10, 10, 20, 20))},
              {"ring 0 is an outline but runs clockwise; reversed"}},
         Slip{"spike",
              {{{10, 10}, {20, 10}, {20, 15}, {25, 15}, {20, 15}, {20, 20}, {10, 20}, {10, 10}}},
@@ -165,16 +165,17 @@ INSTANTIATE_TEST_SUITE_P(
              {"ring 0 crosses itself at (14.99, 20.00), a matter of 0.0008 m2; the loop was "
               "filled"}},
         Slip{"degenerate_hole",
-             {box(10, 10, 20, 20), {{12, 12}, {13, 13}, {12, 12}}},
+             {rectangle(10, 10, 20, 20), {{12, 12}, {13, 13}, {12, 12}}},
              {"ring 1 has only 2 distinct vertices; dropped"}},
         Slip{"flat_hole",
-             {box(10, 10, 20, 20), {{12, 12}, {13, 12}, {14, 12}, {12, 12}}},
+             {rectangle(10, 10, 20, 20), {{12, 12}, {13, 12}, {14, 12}, {12, 12}}},
              {"ring 1 encloses no area; dropped"}}),
     [](const auto& slip) { return std::string(slip.param.name); });
 
 TEST(RepairSite, HolesAreCutOutWhicheverWayTheyRun) {
-  const RepairedSite site = repair(
-      {fence(), feature(Role::obstacle, "court", {box(10, 10, 20, 20), box(12, 12, 18, 18)})});
+  const RepairedSite site =
+      repair({fence(), feature(Role::obstacle, "court",
+                               {rectangle(10, 10, 20, 20), rectangle(12, 12, 18, 18)})});
   EXPECT_DOUBLE_EQ(area_m2(site.map.obstacles), 64);
   EXPECT_THAT(texts(site),
               ElementsAre(HasSubstr("ring 1 is a hole but runs counter-clockwise; reversed")));
@@ -183,8 +184,8 @@ TEST(RepairSite, HolesAreCutOutWhicheverWayTheyRun) {
 TEST(RepairSite, MapThatRunsTheOtherWayRoundIsSaidOnce) {
   std::vector<RawFeature> features{fence()};
   for (int i = 0; i < 6; ++i) {
-    features.push_back(
-        feature(Role::obstacle, std::to_string(i), {reversed(box(10 * i + 1, 1, 10 * i + 6, 6))}));
+    features.push_back(feature(Role::obstacle, std::to_string(i),
+                               {reversed(rectangle(10 * i + 1, 1, 10 * i + 6, 6))}));
   }
   const RepairedSite site = repair(features);
   EXPECT_DOUBLE_EQ(area_m2(site.map.obstacles), 150);
@@ -204,7 +205,7 @@ TEST(RepairSite, LinesWithoutLengthAreDroppedAndCounted) {
 TEST(RepairSite, HoleThatLeavesItsOutlineIsCutAndMeasured) {
   const RepairedSite site =
       repair({fence(), feature(Role::obstacle, "court",
-                               {box(10, 10, 20, 20), reversed(box(18, 12, 22, 14))})});
+                               {rectangle(10, 10, 20, 20), reversed(rectangle(18, 12, 22, 14))})});
   EXPECT_DOUBLE_EQ(area_m2(site.map.obstacles), 96);
   EXPECT_THAT(texts(site), ElementsAre(HasSubstr("ring 1 is a hole but reaches 4.00 m2 outside")));
 }
@@ -219,8 +220,8 @@ TEST(RepairSite, BowTieIsAnError) {
 }
 
 TEST(RepairSite, LoopDrawnTwiceOverIsAnError) {
-  Metres twice = box(10, 10, 20, 20);
-  const Metres inner = box(10, 10, 15, 15);
+  Metres twice = rectangle(10, 10, 20, 20);
+  const Metres inner = rectangle(10, 10, 15, 15);
   twice.insert(twice.end(), inner.begin() + 1, inner.end());
   EXPECT_THAT(repair({fence(), feature(Role::obstacle, "x", {twice})}).errors,
               ElementsAre(HasSubstr("25.00 m2 of 100.00 m2 in doubt")));
@@ -243,9 +244,9 @@ TEST(RepairSite, SelfCrossingToleranceIsHalfAPercentWithinLimits) {
 
 TEST(RepairSite, OverlappingTouchingAndDoubledObstaclesAreUnitedAndSaid) {
   const RepairedSite site =
-      repair({fence(), house(), feature(Role::obstacle, "overlapping", {box(19, 10, 30, 20)}),
-              feature(Role::obstacle, "touching", {box(10, 20, 20, 25)}),
-              feature(Role::obstacle, "doubled", {box(10, 10, 20, 20)})});
+      repair({fence(), house(), feature(Role::obstacle, "overlapping", {rectangle(19, 10, 30, 20)}),
+              feature(Role::obstacle, "touching", {rectangle(10, 20, 20, 25)}),
+              feature(Role::obstacle, "doubled", {rectangle(10, 10, 20, 20)})});
   EXPECT_THAT(site.errors, IsEmpty());
   EXPECT_EQ(site.map.obstacles.size(), 1u);
   EXPECT_DOUBLE_EQ(area_m2(site.map.obstacles), 250);
@@ -260,7 +261,7 @@ TEST(RepairSite, OverlappingTouchingAndDoubledObstaclesAreUnitedAndSaid) {
 
 TEST(RepairSite, PartsOfOneFeatureThatOverlapAreUnited) {
   RawFeature two = house();
-  two.polygons_m.push_back({box(15, 10, 25, 20)});
+  two.polygons_m.push_back({rectangle(15, 10, 25, 20)});
   const RepairedSite site = repair({fence(), two});
   EXPECT_DOUBLE_EQ(area_m2(site.map.obstacles), 150);
   EXPECT_THAT(texts(site), ElementsAre(HasSubstr("its own polygons overlap by 50.00 m2; united")));
@@ -298,7 +299,7 @@ TEST(RepairSite, WalledBoundaryFacesInwardsAndCounts) {
 
 TEST(RepairSite, WallsOutsideTheBoundaryDoNotCount) {
   const RepairedSite site =
-      repair({fence(), feature(Role::obstacle, "across", {box(90, 10, 120, 20)})});
+      repair({fence(), feature(Role::obstacle, "across", {rectangle(90, 10, 120, 20)})});
   double counts_m = 0;
   double all_m = 0;
   for (const SegmentMm& e : edges(site.map.obstacles)) {
@@ -327,8 +328,8 @@ TEST(RepairSite, TargetLinesSelectExactlyThePartOfTheWallTheyRunAlong) {
 
 TEST(RepairSite, TargetDrawnAsAPolygonMeansItsBorder) {
   const RepairedSite site =
-      repair({fence(), house(), feature(Role::obstacle, "shed", {box(40, 40, 45, 45)}),
-              feature(Role::target, "all of the house", {box(10, 10, 20, 20)})});
+      repair({fence(), house(), feature(Role::obstacle, "shed", {rectangle(40, 40, 45, 45)}),
+              feature(Role::target, "all of the house", {rectangle(10, 10, 20, 20)})});
   double counts_m = 0;
   for (const SegmentMm& e : edges(site.map.obstacles)) {
     if (on_target(site.map, e)) counts_m += length_m(e.a, e.b);
@@ -345,10 +346,10 @@ TEST(RepairSite, TargetPartlyOffTheWallsIsSaidAndWhollyOffIsAnError) {
 }
 
 TEST(RepairSite, RegionsAreCutToTheBoundaryAndToEachOther) {
-  RawFeature moat = feature(Role::region, "moat", {box(-10, 0, 50, 100)});
+  RawFeature moat = feature(Role::region, "moat", {rectangle(-10, 0, 50, 100)});
   moat.ground_z_m = -4;
   const RepairedSite site =
-      repair({fence(), house(), moat, feature(Role::region, "yard", {box(40, 0, 100, 100)})});
+      repair({fence(), house(), moat, feature(Role::region, "yard", {rectangle(40, 0, 100, 100)})});
   EXPECT_THAT(site.errors, IsEmpty());
   ASSERT_EQ(site.map.regions.size(), 2u);
   EXPECT_DOUBLE_EQ(area_m2(site.map.regions[0].area), 5000);
@@ -362,9 +363,10 @@ TEST(RepairSite, RegionsAreCutToTheBoundaryAndToEachOther) {
 }
 
 TEST(RepairSite, RegionNamesAreUniqueAndNeverEmpty) {
-  const RepairedSite site = repair({fence(), house(), feature(Role::region, "a", {box(0, 0, 5, 5)}),
-                                    feature(Role::region, "a", {box(50, 0, 60, 5)}),
-                                    feature(Role::region, "", {box(70, 0, 80, 5)})});
+  const RepairedSite site =
+      repair({fence(), house(), feature(Role::region, "a", {rectangle(0, 0, 5, 5)}),
+              feature(Role::region, "a", {rectangle(50, 0, 60, 5)}),
+              feature(Role::region, "", {rectangle(70, 0, 80, 5)})});
   EXPECT_THAT(site.errors, IsEmpty());
   ASSERT_EQ(site.map.regions.size(), 2u);
   EXPECT_DOUBLE_EQ(area_m2(site.map.regions[0].area), 75);
@@ -406,7 +408,7 @@ TEST_P(RepairSiteErrors, AreNamedWithTheirFeature) {
 }
 
 RawFeature region_at_height(double ground_z_m, double x) {
-  RawFeature region = feature(Role::region, "r", {box(x, 0, x + 5, 5)});
+  RawFeature region = feature(Role::region, "r", {rectangle(x, 0, x + 5, 5)});
   region.ground_z_m = ground_z_m;
   return region;
 }
@@ -423,14 +425,14 @@ INSTANTIATE_TEST_SUITE_P(
                {fence(), house(), feature(Role::region, "r", {{{0, 0}, {9, 9}}})},
                "feature 'r': region has no ground"},
         Broken{"region_outside",
-               {fence(), house(), feature(Role::region, "r", {box(200, 0, 210, 9)})},
+               {fence(), house(), feature(Role::region, "r", {rectangle(200, 0, 210, 9)})},
                "feature 'r': region has no ground"},
         Broken{"region_hidden",
-               {fence(), house(), feature(Role::region, "a", {box(0, 0, 9, 9)}),
-                feature(Role::region, "b", {box(1, 1, 8, 8)})},
+               {fence(), house(), feature(Role::region, "a", {rectangle(0, 0, 9, 9)}),
+                feature(Role::region, "b", {rectangle(1, 1, 8, 8)})},
                "feature 'b': region has no ground of its own"},
         Broken{"region_slash",
-               {fence(), house(), feature(Role::region, "a/2", {box(0, 0, 9, 9)})},
+               {fence(), house(), feature(Role::region, "a/2", {rectangle(0, 0, 9, 9)})},
                "contains '/'"},
         Broken{"region_two_heights",
                {fence(), house(), region_at_height(1, 0), region_at_height(2, 9)},
@@ -449,22 +451,23 @@ INSTANTIATE_TEST_SUITE_P(
                 house()},
                "differs from the 1.00 of another boundary"},
         Broken{"far",
-               {fence(), feature(Role::obstacle, "far", {box(3e5, 0, 3.1e5, 9)})},
+               {fence(), feature(Role::obstacle, "far", {rectangle(3e5, 0, 3.1e5, 9)})},
                "feature 'far': ring 0: coordinate (300000, 0) m lies more than 200 km"},
-        Broken{
-            "absurd", {fence(), feature(Role::obstacle, "far", {box(0, 0, 1e300, 9)})}, "1e+300"},
+        Broken{"absurd",
+               {fence(), feature(Role::obstacle, "far", {rectangle(0, 0, 1e300, 9)})},
+               "1e+300"},
         Broken{"not_a_number",
-               {fence(), feature(Role::obstacle, "nan", {box(0, 0, std::nan(""), 9)})},
+               {fence(), feature(Role::obstacle, "nan", {rectangle(0, 0, std::nan(""), 9)})},
                "feature 'nan': ring 0: coordinate (nan"},
         Broken{"far_line",
                {fence(), house(), line(Role::target, "t", {{0, 0}, {-1e9, 0}})},
                "feature 't': coordinate (-1000000000, 0)"},
         Broken{"start_outside", {fence(), house(), start(-5, 5)}, "outside the boundary; move it"},
         Broken{"start_in_house", {fence(), house(), start(15, 15)}, "in an obstacle; move it"},
-        Broken{
-            "start_in_keep_out",
-            {fence(), house(), feature(Role::keep_out, "k", {box(50, 50, 60, 60)}), start(55, 55)},
-            "in a keep-out; move it"},
+        Broken{"start_in_keep_out",
+               {fence(), house(), feature(Role::keep_out, "k", {rectangle(50, 50, 60, 60)}),
+                start(55, 55)},
+               "in a keep-out; move it"},
         Broken{"two_starts", {fence(), house(), start(5, 5), start(6, 6)}, "is a second start"},
         Broken{
             "start_without_point", {fence(), house(), feature(Role::start, "s", {})}, "one Point"},
@@ -476,7 +479,7 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(RepairSite, EveryErrorIsReportedAtOnce) {
   const RepairedSite site =
       repair({fence(), feature(Role::obstacle, "a", {{{10, 10}, {20, 20}, {20, 10}, {10, 20}}}),
-              feature(Role::obstacle, "b", {box(0, 0, 1e9, 9)})});
+              feature(Role::obstacle, "b", {rectangle(0, 0, 1e9, 9)})});
   EXPECT_EQ(site.errors.size(), 2u);
 }
 

@@ -19,7 +19,7 @@ namespace {
 
 using Eigen::Vector2d;
 using support::Dice;
-using Ring = std::vector<Vector2d>;
+using RingM = std::vector<Vector2d>;
 
 constexpr double kSideM = 40;
 constexpr double kRadiusM = 0.3;
@@ -30,26 +30,26 @@ Vector2d drawn_point(Dice& dice) {
           dice.below(2 * static_cast<int>(kSideM) + 1) / 2.0};
 }
 
-Ring drawn_box(Dice& dice) {
+RingM drawn_box(Dice& dice) {
   const Vector2d p = drawn_point(dice);
   const double w = 1 + dice.below(16) / 2.0, h = 1 + dice.below(16) / 2.0;
   return {p, p + Vector2d(w, 0), p + Vector2d(w, h), p + Vector2d(0, h)};
 }
 
-Ring drawn_star(Dice& dice) {
-  Ring ring;
+RingM drawn_star(Dice& dice) {
+  RingM ring;
   for (const nav::PointMm p :
        support::star_mm(dice, drawn_point(dice), dice.uniform(1, 6), 3 + dice.below(6)))
     ring.push_back(nav::to_m(p));
   return ring;
 }
 
-Ring drawn_ring(Dice& dice) {
+RingM drawn_ring(Dice& dice) {
   return dice.below(2) == 0 ? drawn_box(dice) : drawn_star(dice);
 }
 
 // Slips of the pen that leave the meaning as it is.
-void make_dirty(Dice& dice, Ring& ring) {
+void make_dirty(Dice& dice, RingM& ring) {
   const auto place = [&] { return ring.begin() + dice.below(static_cast<int>(ring.size())); };
   if (dice.below(3) == 0) {  // A vertex repeated.
     const auto at = place();
@@ -70,11 +70,11 @@ void make_dirty(Dice& dice, Ring& ring) {
 
 struct Drawing {
   nav::RawSite raw;
-  std::vector<std::vector<Ring>> obstacles;  // Ring by ring as meant: outline, then holes.
+  std::vector<std::vector<RingM>> obstacles;  // RingM by ring as meant: outline, then holes.
 };
 
 // A hole in a box that touches its border in a corner, an edge or not at all.
-Ring hole_in(Dice& dice, const Ring& box) {
+RingM hole_in(Dice& dice, const RingM& box) {
   const Vector2d low = box[0], size = box[2] - box[0];
   const double x = dice.below(3) * size.x() / 4, y = dice.below(3) * size.y() / 4;
   const Vector2d p = low + Vector2d(x, y);
@@ -93,7 +93,7 @@ Drawing draw(Dice& dice) {
   drawing.raw.features.push_back(fence);
   const int count = 2 + dice.below(7);
   for (int i = 0; i < count; ++i) {
-    std::vector<Ring> rings{drawn_ring(dice)};
+    std::vector<RingM> rings{drawn_ring(dice)};
     if (dice.below(3) == 0) {
       rings[0] = drawn_box(dice);
       rings.push_back(hole_in(dice, rings[0]));
@@ -102,16 +102,16 @@ Drawing draw(Dice& dice) {
     drawing.obstacles.push_back(rings);
     const std::string name = "obstacle " + std::to_string(i);
     nav::RawFeature feature{nav::Role::obstacle, name, name, {}, {}, {}, {}, {}, {}};
-    for (Ring& ring : rings) make_dirty(dice, ring);
+    for (RingM& ring : rings) make_dirty(dice, ring);
     feature.polygons_m = {rings};
     drawing.raw.features.push_back(feature);
   }
   return drawing;
 }
 
-double border_distance_m(const std::vector<Ring>& rings, const Vector2d& p) {
+double border_distance_m(const std::vector<RingM>& rings, const Vector2d& p) {
   double least_m = 1e9;
-  for (const Ring& ring : rings)
+  for (const RingM& ring : rings)
     for (std::size_t i = 0; i < ring.size(); ++i)
       least_m =
           std::min(least_m, nav::distance(nav::Segment2{ring[i], ring[(i + 1) % ring.size()]}, p));
@@ -119,9 +119,9 @@ double border_distance_m(const std::vector<Ring>& rings, const Vector2d& p) {
 }
 
 // Even-odd over the rings as meant: inside the outline, outside its holes.
-bool inside(const std::vector<Ring>& rings, const Vector2d& p) {
+bool inside(const std::vector<RingM>& rings, const Vector2d& p) {
   bool in = false;
-  for (const Ring& ring : rings)
+  for (const RingM& ring : rings)
     for (std::size_t i = 0; i < ring.size(); ++i) {
       const Vector2d &a = ring[i], &b = ring[(i + 1) % ring.size()];
       if ((a.y() > p.y()) == (b.y() > p.y())) continue;

@@ -13,7 +13,7 @@
 namespace {
 
 using Eigen::Vector3d;
-constexpr double kDeg = std::numbers::pi / 180;
+constexpr double kDegree = std::numbers::pi / 180;
 
 bool nothing_seen(int, int, int) {
   return false;
@@ -130,8 +130,8 @@ TEST(JudgeSurface, KeepsToTheGrazingLimit) {
 TEST(JudgeSurface, KeepsToTheElevationLimits) {
   Wall wall;
   sim::TruthLimits limits;
-  limits.elevation_min_rad = -5 * kDeg;  // 0.52 m down at 6 m, less than 1 m at the ends.
-  limits.elevation_max_rad = 2 * kDeg;   // 0.21 m up at 6 m.
+  limits.elevation_min_rad = -5 * kDegree;  // 0.52 m down at 6 m, less than 1 m at the ends.
+  limits.elevation_max_rad = 2 * kDegree;   // 0.21 m up at 6 m.
   for (const auto& voxel : wall.judge(limits).missed) {
     EXPECT_GE(voxel.z, 1);
     EXPECT_LE(voxel.z, 2);
@@ -240,7 +240,7 @@ TEST(JudgeSurface, AgreesWithTheDefinitionOnRandomSites) {
     std::vector<Vector3d> positions;
     for (int i = 0; i < 150; ++i) positions.push_back({uniform(-12, 12), uniform(-12, 12), 1.8});
     const sim::TruthGrid grid{{-12.3, -12.1, -0.7}, 1, 25, 25, 10};
-    const sim::TruthLimits limits{1, 12, 65 * kDeg, -50 * kDeg, 70 * kDeg};
+    const sim::TruthLimits limits{1, 12, 65 * kDegree, -50 * kDegree, 70 * kDegree};
     const auto expected = visible_by_definition(mesh, grid, limits, positions);
     const sim::Scene scene(mesh);
     for (const int threads : {1, 2}) {

@@ -16,7 +16,7 @@ using boost::system::errc::io_error;
 
 constexpr double kPi = std::numbers::pi;
 
-sim::WorldConfig perfect() {
+sim::WorldConfig perfect_world() {
   sim::WorldConfig config;
   config.slip_sigma = 0;
   config.gyro_sigma_radps = config.gyro_bias_sigma_radps = 0;
@@ -52,7 +52,7 @@ struct Driven {
 };
 
 TEST(World, DrivesStraightByTheCommandedSpeedLessTheLag) {
-  Driven robot(sim_test::plain(100), perfect());
+  Driven robot(sim_test::plain(100), perfect_world());
   ASSERT_TRUE(robot.world.put_robot(pose(1, 2, kPi / 2), 0));
   ASSERT_TRUE(robot.drive({0.5, 0}, 10));
   // A first-order lag costs the speed times its time constant.
@@ -63,7 +63,7 @@ TEST(World, DrivesStraightByTheCommandedSpeedLessTheLag) {
 }
 
 TEST(World, TurnsOnTheSpot) {
-  Driven robot(sim_test::plain(100), perfect());
+  Driven robot(sim_test::plain(100), perfect_world());
   ASSERT_TRUE(robot.world.put_robot(pose(1, 2, 0), 0));
   ASSERT_TRUE(robot.drive({0, 0.5}, 4));
   EXPECT_NEAR(robot.heading_rad(), 0.5 * (4 - 0.2), 0.01);
@@ -72,7 +72,7 @@ TEST(World, TurnsOnTheSpot) {
 }
 
 TEST(World, DrivesACircleOfTheRadiusItIsCommanded) {
-  Driven robot(sim_test::plain(100), perfect());
+  Driven robot(sim_test::plain(100), perfect_world());
   ASSERT_TRUE(robot.world.put_robot(pose(0, 0, 0), 0));
   // Both sides lag alike, so the path is the circle of radius 0.8 / 0.4 around (0, 2) throughout.
   for (int i = 0; i < 100; ++i) {
@@ -82,21 +82,21 @@ TEST(World, DrivesACircleOfTheRadiusItIsCommanded) {
 }
 
 TEST(World, ClampsToItsLimitsWithoutChangingTheCurve) {
-  Driven robot(sim_test::plain(100), perfect());
+  Driven robot(sim_test::plain(100), perfect_world());
   ASSERT_TRUE(robot.world.put_robot(pose(0, 0, 0), 0));
   robot.drive({4.0, 0.4}, 10);
   const double radius_m = 10;
   EXPECT_NEAR(std::hypot(robot.x(), robot.y() - radius_m), radius_m, 1e-6);
   EXPECT_LE(robot.world.driven_m(), 10.0);
   EXPECT_GT(robot.world.driven_m(), 9.0);
-  Driven turner(sim_test::plain(100), perfect());
+  Driven turner(sim_test::plain(100), perfect_world());
   ASSERT_TRUE(turner.world.put_robot(pose(0, 0, 0), 0));
   turner.drive({0, -9}, 2);
   EXPECT_NEAR(turner.heading_rad(), -kPi / 4 * (2 - 0.2), 0.01);
 }
 
 TEST(World, StopsHalfASecondAfterTheLastCommand) {
-  Driven robot(sim_test::plain(100), perfect());
+  Driven robot(sim_test::plain(100), perfect_world());
   ASSERT_TRUE(robot.world.put_robot(pose(0, 0, 0), 0));
   robot.drive({1, 0}, 5);
   const double before_m = robot.x();
@@ -109,7 +109,7 @@ TEST(World, StopsHalfASecondAfterTheLastCommand) {
 }
 
 TEST(World, RefusesTwistsThatAreNotNumbers) {
-  Driven robot(sim_test::plain(100), perfect());
+  Driven robot(sim_test::plain(100), perfect_world());
   EXPECT_EQ(robot.world.command({std::nan(""), 0}).error(), invalid_argument);
   EXPECT_EQ(robot.world.command({0, std::numeric_limits<double>::infinity()}).error(),
             invalid_argument);
@@ -134,7 +134,7 @@ TEST(World, DoesNotDependOnHowOftenItIsAdvanced) {
 }
 
 TEST(World, EncodersLoseNothingToTheirTicks) {
-  auto config = perfect();
+  auto config = perfect_world();
   config.encoder_tick_m = 0.007;  // Coarser than a report's travel at low speed.
   Driven robot(sim_test::plain(100), config);
   ASSERT_TRUE(robot.world.put_robot(pose(0, 0, 0), 0));
@@ -194,7 +194,7 @@ TEST(World, SlipMakesTheTravelErrorItClaims) {
 }
 
 TEST(World, GyroSaysTheTurnRatePlusItsBiasAndNoise) {
-  sim::WorldConfig config = perfect();
+  sim::WorldConfig config = perfect_world();
   config.gyro_sigma_radps = 0.01;
   Driven robot(sim_test::plain(100), config);
   ASSERT_TRUE(robot.world.put_robot(pose(0, 0, 0), 0));
@@ -216,7 +216,7 @@ TEST(World, GyroBiasStaysWithinARunAndVariesOverSeedsAsClaimed) {
   double squares = 0;
   constexpr int kSeeds = 2000;
   for (int seed = 0; seed < kSeeds; ++seed) {
-    sim::WorldConfig config = perfect();
+    sim::WorldConfig config = perfect_world();
     config.seed = static_cast<std::uint64_t>(seed);
     config.gyro_bias_sigma_radps = 0.002;
     sim::World world(scene, config);
@@ -229,7 +229,7 @@ TEST(World, GyroBiasStaysWithinARunAndVariesOverSeedsAsClaimed) {
 }
 
 TEST(World, GnssErrorIsAsLargeAsTheReceiverClaimsAndPartlyWanders) {
-  sim::WorldConfig config = perfect();
+  sim::WorldConfig config = perfect_world();
   config.gnss_sigma_m = 0.03;
   Driven robot(sim_test::plain(100), config);
   ASSERT_TRUE(robot.world.put_robot(pose(3, 4, 0), 0));
@@ -251,7 +251,7 @@ TEST(World, GnssErrorIsAsLargeAsTheReceiverClaimsAndPartlyWanders) {
 }
 
 TEST(World, NoSatelliteIsSeenWithinAnOutage) {
-  sim::WorldConfig config = perfect();
+  sim::WorldConfig config = perfect_world();
   config.gnss_outages = {{{0, 0}, {10, 0}, {10, 4}, {4, 4}, {4, 10}, {0, 10}},
                          {{20, 0}, {30, 0}, {25, 5}}};
   Driven robot(sim_test::plain(100), config);
@@ -292,7 +292,7 @@ sim::Mesh wall_at_x5() {
 }
 
 TEST(World, StopsAtAWallAndRefusesToPushOn) {
-  Driven robot(wall_at_x5(), perfect());
+  Driven robot(wall_at_x5(), perfect_world());
   ASSERT_TRUE(robot.world.put_robot(pose(0, 0, 0), 0));
   EXPECT_EQ(robot.drive({1, 0}, 10).error(), io_error);
   EXPECT_NEAR(robot.x(), 4.5, 0.02);
@@ -302,7 +302,7 @@ TEST(World, StopsAtAWallAndRefusesToPushOn) {
 }
 
 TEST(World, BacksOffFromAWallAndHitsItAgain) {
-  Driven robot(wall_at_x5(), perfect());
+  Driven robot(wall_at_x5(), perfect_world());
   ASSERT_TRUE(robot.world.put_robot(pose(0, 0, 0), 0));
   robot.drive({1, 0}, 10);
   EXPECT_TRUE(robot.drive({-0.5, 0}, 4));
@@ -312,7 +312,7 @@ TEST(World, BacksOffFromAWallAndHitsItAgain) {
 }
 
 TEST(World, TurnsAwayFromAWallAndDrivesOn) {
-  Driven robot(wall_at_x5(), perfect());
+  Driven robot(wall_at_x5(), perfect_world());
   ASSERT_TRUE(robot.world.put_robot(pose(0, 0, 0), 0));
   robot.drive({1, 0}, 10);
   EXPECT_TRUE(robot.drive({0, 0.7}, kPi / 0.7));
@@ -323,7 +323,7 @@ TEST(World, TurnsAwayFromAWallAndDrivesOn) {
 }
 
 TEST(World, HitsWithItsSideNotOnlyItsFront) {
-  Driven robot(wall_at_x5(), perfect());
+  Driven robot(wall_at_x5(), perfect_world());
   ASSERT_TRUE(robot.world.put_robot(pose(4.45, -10, 1.55), 0));  // Closes in by 2 cm a metre.
   EXPECT_EQ(robot.drive({1, 0}, 20).error(), io_error);
   EXPECT_LE(robot.x(), 4.5);
@@ -336,7 +336,7 @@ TEST(World, NoPoleIsTooThinToHit) {
                            {{5, 0.37, 0.4}, {5, 0.371, 0.4}, {5, 0.37, 0.41}});
   const auto n = static_cast<std::uint32_t>(mesh.W_vertices_m.size());
   mesh.triangles.push_back({n - 3, n - 2, n - 1});
-  Driven robot(mesh, perfect());
+  Driven robot(mesh, perfect_world());
   ASSERT_TRUE(robot.world.put_robot(pose(0, 0, 0), 0));
   EXPECT_EQ(robot.drive({1, 0}, 10).error(), io_error);
   const double contact_m = 5 - std::sqrt(0.25 - 0.37 * 0.37);
@@ -347,7 +347,7 @@ TEST(World, PassesBelowAnArchAndOverAKerb) {
   sim::Mesh mesh = sim_test::plain(100);
   sim_test::add_box(mesh, {5, -2, 1.6}, {6, 2, 4});
   sim_test::add_box(mesh, {9, -2, 0}, {12, 2, 0.1});
-  Driven robot(mesh, perfect());
+  Driven robot(mesh, perfect_world());
   ASSERT_TRUE(robot.world.put_robot(pose(0, 0, 0), 0));
   EXPECT_TRUE(robot.drive({1, 0}, 10.7));
   EXPECT_NEAR(robot.x(), 10.5, 0.1);
@@ -362,7 +362,7 @@ TEST(World, StopsBeforeItFallsIntoAMoat) {
   mesh.add_quad({-50, -50, 0}, {5, -50, 0}, {5, 50, 0}, {-50, 50, 0});
   mesh.add_quad({5, -50, 0}, {5, 50, 0}, {5, 50, -3}, {5, -50, -3});
   mesh.add_quad({5, -50, -3}, {50, -50, -3}, {50, 50, -3}, {5, 50, -3});
-  Driven robot(mesh, perfect());
+  Driven robot(mesh, perfect_world());
   ASSERT_TRUE(robot.world.put_robot(pose(0, 0, 0), 0));
   EXPECT_EQ(robot.drive({1, 0}, 10).error(), io_error);
   EXPECT_LE(robot.x(), 4.62);
@@ -372,7 +372,7 @@ TEST(World, StopsBeforeItFallsIntoAMoat) {
 TEST(World, ClimbsARampAndKeepsToItsGround) {
   sim::Mesh mesh = sim_test::plain(4);
   mesh.add_quad({4, -4, 0}, {24, -4, 3}, {24, 4, 3}, {4, 4, 0});
-  Driven robot(mesh, perfect());
+  Driven robot(mesh, perfect_world());
   ASSERT_TRUE(robot.world.put_robot(pose(0, 0, 0), 0));
   EXPECT_TRUE(robot.drive({1, 0}, 15));
   EXPECT_NEAR(robot.world.robot().ground_z_m, (robot.x() - 4) * 0.15, 0.02);
@@ -380,7 +380,7 @@ TEST(World, ClimbsARampAndKeepsToItsGround) {
 }
 
 TEST(World, PutsTheRobotOnlyWhereItCanStand) {
-  Driven robot(wall_at_x5(), perfect());
+  Driven robot(wall_at_x5(), perfect_world());
   EXPECT_TRUE(robot.world.put_robot(pose(4.4, 0, 0), 0.7));
   EXPECT_NEAR(robot.world.robot().ground_z_m, 0, 1e-4);
   EXPECT_EQ(robot.world.put_robot(pose(4.6, 0, 0), 0).error(), address_not_available);

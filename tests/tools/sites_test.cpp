@@ -18,8 +18,8 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using namespace tools_test;
 
-const std::filesystem::path kSource = VANTAGE_SOURCE_DIR;
-const std::filesystem::path kSites = kSource / "configs/sites";
+const std::filesystem::path kSourceTree = VANTAGE_SOURCE_DIR;
+const std::filesystem::path kSites = kSourceTree / "configs/sites";
 
 constexpr std::int64_t kRobotRadiusMm = 500;
 
@@ -361,7 +361,7 @@ TEST(MakeSites, RefusesACommandLineItDoesNotKnow) {
 
 std::vector<std::filesystem::path> toml_files(const char* folder) {
   std::vector<std::filesystem::path> files;
-  for (const auto& entry : std::filesystem::directory_iterator(kSource / "configs" / folder))
+  for (const auto& entry : std::filesystem::directory_iterator(kSourceTree / "configs" / folder))
     if (entry.path().extension() == ".toml") files.push_back(entry.path());
   std::sort(files.begin(), files.end());
   return files;

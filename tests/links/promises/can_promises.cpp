@@ -5,7 +5,7 @@ namespace {
 
 namespace errc = boost::system::errc;
 
-constexpr std::uint32_t kProbe = 0x7E5;
+constexpr std::uint32_t kProbeId = 0x7E5;
 
 hal::Time in(CanRig& rig, hal::Duration span) {
   return rig.loop().clock().now() + span;
@@ -28,12 +28,12 @@ hal::Task<hal::CanFrame> next(hal::CanBus& bus) {
   for (;;) {
     const auto received = co_await bus.receive();
     require_success(received, "receive");
-    if (received->frame.id != kProbe) co_return received->frame;
+    if (received->frame.id != kProbeId) co_return received->frame;
   }
 }
 
 hal::Task<bool> probe(CanRig& rig, hal::CanBus& from, hal::CanBus& to) {
-  if (!co_await from.send({kProbe, 0}, in(rig, 1s))) {
+  if (!co_await from.send({kProbeId, 0}, in(rig, 1s))) {
     co_await rig.loop().clock().sleep_for(20ms);
     co_return false;
   }
@@ -148,7 +148,7 @@ hal::Task<void> at_most_one_frame_waits(CanRig& rig) {
       const auto received = co_await rig.b().receive();
       if (!received) continue;  // It may have been unplugged meanwhile, and is told so.
       if (received->frame == frame_number(9)) co_return;
-      if (received->frame.id != kProbe) ++old_frames;
+      if (received->frame.id != kProbeId) ++old_frames;
     }
   };
   const auto send_until_it_goes = [&]() -> hal::Task<void> {
