@@ -87,6 +87,10 @@ std::vector<Trouble> TcpStream::troubles() const {
   return trouble ? std::vector{*trouble} : std::vector<Trouble>{};
 }
 
+void TcpStream::drop() {
+  state_->drop();
+}
+
 bool TcpStream::connected() const {
   return state_->stream() != nullptr;
 }

@@ -27,6 +27,7 @@ class TcpStream final : public hal::ByteStream, public Link {
   std::string address() const override { return to_text(LinkAddress(address_)); }
   std::vector<Trouble> troubles() const override;
   bool connected() const;
+  void drop();  // Ends the connection, to be made anew; whoever reads is told of the loss.
 
  private:
   struct State;
