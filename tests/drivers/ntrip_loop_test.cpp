@@ -5,7 +5,7 @@
 #include "sim/ublox_unit.hpp"
 #include "tests/drivers/stream_loop.hpp"
 
-namespace {
+namespace ntrip_loop {
 
 using drivers::NtripVersion;
 using drivers_test::detail_of;
@@ -332,4 +332,4 @@ TEST(Ntrip, HoldsNoMoreThanItSays) {
   loop.run_for(1);
 }
 
-}  // namespace
+}  // namespace ntrip_loop
