@@ -5,6 +5,7 @@
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 #include "drivers/nmea_codec.hpp"
 #include "drivers/rtcm3.hpp"
@@ -42,8 +43,9 @@ constexpr Fault kForeign{5, "not a caster", "another server answers at that addr
 constexpr Fault kUnauthorised{6, "caster refuses user or password",
                               "a wrong or expired account, or one that is in use elsewhere",
                               "correct the credentials file; ask who runs the caster"};
-constexpr Fault kNoMountpoint{7, "no such mountpoint", "misspelt, renamed, or its base is off",
-                              "correct the mountpoint in [corrections]: the detail names some"};
+constexpr Fault kNoMountpoint{
+    7, "no such mountpoint", "misspelt, renamed, or its base is off",
+    "correct the mountpoint in [corrections]; the caster's table of sources lists them"};
 constexpr Fault kRefused{8, "caster refuses", "see the detail", "ask who runs the caster"};
 constexpr Fault kBroken{9, "caster's answer damaged", "something in between changes what it sends",
                         "set version = 1 in [corrections]; take proxies away"};

@@ -4,6 +4,7 @@
 #include <array>
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <cstdio>
+#include <utility>
 
 #include "drivers/gnss_demux.hpp"
 #include "drivers/rtcm3.hpp"
