@@ -14,6 +14,11 @@ namespace errc = boost::system::errc;
 constexpr hal::Duration kCycle = 20ms;
 // Never below three times the longest period that any manual gives.
 constexpr hal::Duration kMotionSilence = 200ms;
+// So long after a cycle was due we were held up: what came meanwhile waits in the link.
+constexpr hal::Duration kHeldUp = 2 * kCycle;
+constexpr hal::Duration kHeldUpMax = 1s;     // Longer is trouble of its own.
+constexpr hal::Duration kHearing = 1ms;      // Nothing more came for so long: all is heard.
+constexpr hal::Duration kHearingMax = 50ms;  // There is no end to it: a bus full of frames.
 constexpr hal::Duration kStateSilence = 500ms;
 constexpr hal::Duration kMotionGap = 50ms;
 constexpr hal::Duration kStateDouble = 50ms;
@@ -165,6 +170,7 @@ hal::Task<void> AgilexDrive::listen() {
   for (;;) {
     const auto received = co_await bus_.receive();
     if (received) {
+      ++frames_heard_;
       receive_error_ = {};
       hear(*received);
     } else {
@@ -276,10 +282,20 @@ void AgilexDrive::on(const agilex::MotionCommand&, hal::Time at) {
 
 // --- What it is told.
 
+hal::Task<void> AgilexDrive::hear_what_waits() {
+  const hal::Time late = clock_.now() + kHearingMax;
+  for (std::uint64_t before = frames_heard_ + 1; before != frames_heard_ && clock_.now() < late;) {
+    before = frames_heard_;
+    co_await clock_.sleep_for(kHearing);
+  }
+}
+
 hal::Task<void> AgilexDrive::keep() {
+  attended_at_ = clock_.now();
   for (hal::Time next = clock_.now();; next = std::max(next + kCycle, clock_.now())) {
     co_await clock_.sleep_until(next);
-    const hal::Time now = clock_.now();
+    if (clock_.now() - attended_at_ > kCycle + kHeldUp) co_await hear_what_waits();
+    const hal::Time now = attended_at_ = clock_.now();
     if (heard_.system && !talks(now)) silence_over_ = false;
     if (talks(now)) talked_at_ = now;
     ran_ = ran_ || drives(now);
@@ -363,7 +379,7 @@ boost::system::error_code AgilexDrive::disobeys(hal::Time now) const {
 }
 
 hal::DriveStatus AgilexDrive::status() const {
-  const hal::Time now = clock_.now();
+  const hal::Time now = heard_until(clock_.now());
   const bool known = within(heard_.system_at, now, kStateSilence);
   hal::DriveStatus status;
   status.reported_at = heard_.motion_at;
@@ -427,11 +443,19 @@ hal::Task<void> AgilexDrive::release() {
 
 // --- How it is.
 
+// Until a cycle shows that we were not held up, we know of no later time whether the base spoke.
+hal::Time AgilexDrive::heard_until(hal::Time now) const {
+  if (now - attended_at_ > kHeldUpMax) return now;
+  return std::min(now, attended_at_ + kCycle + kHeldUp);
+}
+
 bool AgilexDrive::frozen(hal::Time now) const {
+  now = heard_until(now);
   return within(heard_.system_at, now, kStateSilence) && now - heard_.count_at > kStateSilence;
 }
 
 bool AgilexDrive::talks(hal::Time now) const {
+  now = heard_until(now);
   return within(heard_.system_at, now, kStateSilence) &&
          within(heard_.motion_at, now, kMotionSilence) && !frozen(now) && silence_over_;
 }

@@ -19,6 +19,9 @@ namespace drivers {
 
 // Takes command of the base by itself, again after every loss, and never against a transmitter or
 // an e-stop. The base is told to stand unless commands come.
+//
+// Silence is judged by the times at which frames arrived, and only when those that wait were heard:
+// a program that was held up for a while says nothing of a base that went on talking.
 class AgilexDrive final : public hal::GuardedDrive, public Device {
  public:
   enum class Model { scout2, scout_mini, bunker };
@@ -80,6 +83,7 @@ class AgilexDrive final : public hal::GuardedDrive, public Device {
 
   hal::Task<void> listen();
   hal::Task<void> keep();
+  hal::Task<void> hear_what_waits();
   void hear(const hal::ReceivedFrame& received);
   void hear_other(const hal::ReceivedFrame& received);
   void on(const agilex::SystemState& system, hal::Time at);
@@ -97,6 +101,7 @@ class AgilexDrive final : public hal::GuardedDrive, public Device {
   hal::Task<hal::Result<hal::Duration>> creep_then_say_nothing();
   boost::system::error_code disobeys(hal::Time now) const;
 
+  hal::Time heard_until(hal::Time now) const;
   bool talks(hal::Time now) const;   // Reports come as they should.
   bool drives(hal::Time now) const;  // And the base obeys us.
   bool held() const;                 // By a person or by itself.
@@ -113,6 +118,8 @@ class AgilexDrive final : public hal::GuardedDrive, public Device {
   Heard heard_;
   bool started_ = false, ran_ = false, released_ = false;
   hal::Time started_at_{}, talked_at_{}, released_at_{};
+  hal::Time attended_at_{};  // When keep() last knew that all that had come was heard.
+  std::uint64_t frames_heard_{};
 
   Odometer odometer_;
   hal::Wake odometry_heard_;

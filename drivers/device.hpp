@@ -40,6 +40,8 @@ class Device {
   virtual DeviceState state() const = 0;
   virtual const Identity& identity() const = 0;       // Empty before it was identified.
   virtual std::vector<Trouble> troubles() const = 0;  // Present now; empty when healthy.
+  // What else is worth knowing now, for a person, in one line; empty: nothing.
+  virtual std::string condition() const { return {}; }
 };
 
 }  // namespace drivers

@@ -21,6 +21,7 @@
 #include <utility>
 #include <variant>
 
+#include "drivers/back_off.hpp"
 #include "drivers/link_trouble.hpp"
 #include "hal/clock.hpp"
 #include "hal/wake.hpp"
@@ -37,23 +38,6 @@ inline void end_of_link(std::exception_ptr problem) {
     if (error.code() != boost::asio::error::operation_aborted) throw;
   }
 }
-
-// The pause before the next attempt: doubles up to a bound.
-class BackOff {
- public:
-  BackOff(hal::Duration first, hal::Duration longest) : first_(first), longest_(longest) {}
-
-  hal::Duration next() {
-    const hal::Duration pause = next_.value_or(first_);
-    next_ = std::min(2 * pause, longest_);
-    return pause;
-  }
-  void reset() { next_.reset(); }
-
- private:
-  hal::Duration first_, longest_;
-  std::optional<hal::Duration> next_;
-};
 
 // Stream: a socket or stream descriptor of Asio. Held by shared_ptr: by its link, and by what is
 // still under way when the link goes.

@@ -82,6 +82,8 @@ struct NmeaSentence {
 std::optional<NmeaSentence> parse_nmea(ByteView frame);
 // "$" + text + "*hh\r\n"
 std::string encode_nmea(std::string_view text);
+// The whole GGA sentence of an epoch that is usable() and has a time; what it lacks is left empty.
+std::string nmea_gga(const GnssEpoch& epoch);
 
 // "4552.65403", 'S' and so on, exactly, to 9 decimals of a minute; what is beyond is cut off.
 std::optional<ExactAngle> nmea_angle(std::string_view text, std::string_view side, int degrees_max);

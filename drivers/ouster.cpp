@@ -1,6 +1,7 @@
 #include "drivers/ouster.hpp"
 
 #include <algorithm>
+#include <boost/asio/experimental/awaitable_operators.hpp>
 #include <cmath>
 #include <numbers>
 
@@ -35,11 +36,28 @@ hal::ScanPattern pattern_of(const OusterMetadata& m) {
 
 }  // namespace
 
-Ouster::Ouster(OusterConfig config, hal::Clock& clock, hal::Datagrams& datagrams)
-    : UdpScanner(config.scan, clock, datagrams),
-      config_(std::move(config)),
-      pattern_(pattern_of(config_.metadata)) {
+Ouster::Ouster(OusterConfig config, hal::Clock& clock, hal::Datagrams& datagrams, OusterApi api)
+    : UdpScanner(config.scan, clock, datagrams), config_(std::move(config)) {
+  if (api.link != nullptr)
+    asker_.emplace(std::move(api.config), config_.metadata, clock, *api.link, std::move(api.drop),
+                   troubles_, [this](OusterMetadata its) { adopt(std::move(its)); });
+  adopt(std::move(config_.metadata));
+}
+
+hal::Task<void> Ouster::run() {
+  using boost::asio::experimental::awaitable_operators::operator&&;
+  if (!asker_)
+    co_await UdpScanner::run();
+  else
+    co_await (UdpScanner::run() && asker_->run());
+}
+
+// Also in the middle of a scan: the pattern of what may be adopted is the same.
+void Ouster::adopt(OusterMetadata metadata) {
+  config_.metadata = std::move(metadata);
   const OusterMetadata& m = config_.metadata;
+  pattern_ = pattern_of(m);
+  cells_.clear();
   identity_ = {"Ouster", m.model, m.serial_number, m.firmware};
   cells_.reserve(m.rows * m.columns_per_frame);
   for (std::size_t row = 0; row < m.rows; ++row)
@@ -64,6 +82,7 @@ std::string_view Ouster::check_sender() const {
 
 std::string_view Ouster::read(ByteView bytes, hal::Time arrival) {
   if (bytes.size() == kImuPacket) return {};  // Its IMU's, when sent to the same port.
+  if (asker_ && !asker_->refused().empty()) return asker_->refused();
   if (const auto why = decode_ouster(bytes, config_.metadata, packet_); !why.empty()) return why;
   if (const auto why = check_sender(); !why.empty()) return why;
   const auto now_ns = static_cast<std::int64_t>(packet_.columns.front().timestamp_ns);

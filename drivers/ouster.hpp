@@ -1,9 +1,10 @@
 // Ouster OS0, OS1, OS2 over UDP: a 3-D scanner that needs no pan unit. Its metadata, as it serves
 // them at /api/v1/sensor/metadata, are part of its configuration: without them no packet can be
-// read.
+// read. Where it can be asked over HTTP, its own take their place at the start.
 #pragma once
 
 #include "drivers/clock_fit.hpp"
+#include "drivers/ouster_asker.hpp"
 #include "drivers/ouster_codec.hpp"
 #include "drivers/udp_scanner.hpp"
 
@@ -14,14 +15,22 @@ struct OusterConfig {
   OusterMetadata metadata;  // parse_ouster_metadata()
 };
 
+// Where its settings are served; without a link it is not asked.
+struct OusterApi {
+  OusterAskerConfig config;
+  hal::ByteStream* link{};
+  DropLink drop;
+};
+
 // S is the sensor's frame as the maker draws it. Columns are the measurements of a turn, rows the
 // beams from the lowest. Of two returns the first counts.
 class Ouster final : public UdpScanner {
  public:
-  // The clock and the datagrams (of port 7502) must outlive it.
-  Ouster(OusterConfig config, hal::Clock& clock, hal::Datagrams& datagrams);
+  // The clock and the links (datagrams of port 7502) must outlive it.
+  Ouster(OusterConfig config, hal::Clock& clock, hal::Datagrams& datagrams, OusterApi api = {});
 
   std::string_view model() const override { return "ouster"; }
+  hal::Task<void> run() override;
 
  private:
   std::string_view read(ByteView packet, hal::Time arrival) override;
@@ -33,8 +42,10 @@ class Ouster final : public UdpScanner {
   void begin() override;
   void fill(TurnMerge& into) override;
   int turns_done() const override { return turns_; }
+  void adopt(OusterMetadata metadata);
 
-  const OusterConfig config_;
+  OusterConfig config_;
+  std::optional<OusterAsker> asker_;
   hal::ScanPattern pattern_;
   // Of every row and measurement: where its beam goes, its column and how far off its middle.
   struct Cell {

@@ -87,6 +87,17 @@ std::vector<Trouble> TcpStream::troubles() const {
   return trouble ? std::vector{*trouble} : std::vector<Trouble>{};
 }
 
+std::string TcpStream::own_address() const {
+  if (!connected()) return {};
+  error_code error;
+  const auto end = state_->stream()->local_endpoint(error);
+  return error ? std::string() : end.address().to_string();
+}
+
+void TcpStream::drop() {
+  state_->drop();
+}
+
 bool TcpStream::connected() const {
   return state_->stream() != nullptr;
 }

@@ -27,6 +27,8 @@ class TcpStream final : public hal::ByteStream, public Link {
   std::string address() const override { return to_text(LinkAddress(address_)); }
   std::vector<Trouble> troubles() const override;
   bool connected() const;
+  std::string own_address() const;  // This side's IP address, as the peer sees it; empty: lost.
+  void drop();  // Ends the connection, to be made anew; whoever reads is told of the loss.
 
  private:
   struct State;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <boost/asio/experimental/awaitable_operators.hpp>
+#include <cmath>
 
 #include "drivers/gnss_demux.hpp"
 #include "drivers/recognise.hpp"
@@ -226,6 +227,24 @@ void Ublox::judge_corrections(hal::Time now) {
   if (corrections_ == nullptr) return;
   output_.troubles().set_if(now - correction_at_ > kCorrectionsOld, kNoCorrections,
                             std::to_string((now - correction_at_) / 1s) + " s without");
+}
+
+std::optional<double> Ublox::since_correction_s() const {
+  if (passed_ == 0) return std::nullopt;
+  return hal::seconds(clock_.now() - correction_at_);
+}
+
+std::string Ublox::condition() const {
+  const GnssEpoch& last = output_.last();
+  std::string text;
+  if (last.quality == GnssQuality::rtk_fixed) text = "RTK, fixed";
+  if (last.quality == GnssQuality::rtk_float) text = "RTK, float";
+  const auto add = [&text](double age_s, const char* what) {
+    text += (text.empty() ? "" : ", ") + std::to_string(std::llround(age_s)) + what;
+  };
+  if (last.correction_age_s) add(*last.correction_age_s, " s old corrections at most in use");
+  if (const auto since_s = since_correction_s()) add(*since_s, " s since the last came");
+  return text;
 }
 
 // A request never parts a correction that is still being written.

@@ -31,12 +31,15 @@ class Ublox final : public hal::Gnss, public Device {
   DeviceState state() const override { return state_; }
   const Identity& identity() const override { return identity_; }
   std::vector<Trouble> troubles() const override { return output_.troubles().all(); }
+  std::string condition() const override;
 
   const GnssOutput& output() const { return output_; }
   int baud() const { return baud_; }
   // Frames of corrections: passed on, and dropped because the receiver was not running.
   std::uint64_t corrections_passed() const { return passed_; }
   std::uint64_t corrections_dropped() const { return dropped_; }
+  // Since the last one that was passed on; nothing before the first.
+  std::optional<double> since_correction_s() const;
 
  private:
   hal::Task<void> serve();

@@ -1,4 +1,5 @@
 // UBX messages as an epoch's fix, and the receiver's faults by name.
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <utility>
@@ -43,6 +44,13 @@ GnssQuality quality_of(const UbxNavPvt& pvt) {
   if (pvt.carrier == UbxCarrier::fixed) return GnssQuality::rtk_fixed;
   if (pvt.carrier == UbxCarrier::floating) return GnssQuality::rtk_float;
   return pvt.differential ? GnssQuality::differential : GnssQuality::single;
+}
+
+// Of the codes of NAV-PVT: the most that each can mean; the last has no end.
+std::optional<double> correction_age_s(const UbxNavPvt& pvt) {
+  constexpr double kMost_s[] = {0, 1, 2, 5, 10, 15, 20, 30, 45, 60, 90, 120, 120};
+  if (pvt.correction_age_code == 0) return std::nullopt;
+  return kMost_s[std::min<std::size_t>(pvt.correction_age_code, std::size(kMost_s) - 1)];
 }
 
 GnssDate date_of(const UbxNavPvt& pvt, bool day_before) {
@@ -110,6 +118,7 @@ GnssEpoch epoch_of(const UbxNavPvt& pvt) {
   epoch.quality = quality_of(pvt);
   epoch.satellites_used = pvt.satellites;
   epoch.pdop = pvt.pdop_centi / 100.0;
+  epoch.correction_age_s = correction_age_s(pvt);
   if (pvt.date_valid && pvt.time_valid && pvt.month >= 1 && pvt.month <= 12) {
     const std::int64_t time_ns =
         (pvt.hour * 3600LL + pvt.minute * 60LL + pvt.second) * kSecond_ns + pvt.nano;

@@ -197,9 +197,9 @@ void load_robot(Draft& draft, const fs::path& mission_file, const fs::path& repl
     read_robot_text(draft, *text, path.generic_string());
 }
 
-void load_metadata_path(MissionConfig& config) {
-  auto& path = config.robot.scanner.metadata;
-  if (!path.empty()) path = relative_to(config.robot_file, path);
+void load_robot_paths(MissionConfig& config) {
+  for (auto* path : {&config.robot.scanner.metadata, &config.robot.corrections.account})
+    if (!path->empty()) *path = relative_to(config.robot_file, *path);
 }
 
 void load_plan(Draft& draft, const fs::path& mission_file) {
@@ -259,7 +259,7 @@ LoadedMission load_mission(const fs::path& file, const Overrides& overrides) {
   }
   check_site_folder(draft, file, overrides);
   load_robot(draft, file, overrides.robot_file);
-  load_metadata_path(draft.config());
+  load_robot_paths(draft.config());
   if (overrides.radius_m) draft.config().robot.body.radius_m = *overrides.radius_m;
   if (overrides.margin_m) draft.config().margin_m = *overrides.margin_m;
   load_plan(draft, file);

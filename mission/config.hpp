@@ -37,6 +37,7 @@ struct ScannerConfig {
   std::string link = "tcp:192.168.0.1:2112";
   std::string model;               // Of a Hokuyo: how what it says it is begins; empty: any.
   std::filesystem::path metadata;  // Of an Ouster: file, relative to the robot file.
+  std::string api_link;            // Of an Ouster: where it serves its settings; empty: not asked.
   // How a profile scanner hangs on the pan axis, as drivers::SweepMount has it.
   double tilt_deg = 35.0;  // How high its straight ahead looks.
   double roll_deg = 0, yaw_deg = 0;
@@ -71,6 +72,16 @@ struct ImuConfig {
 struct GnssConfig {
   std::string device = "ublox";
   std::string link = "serial:/dev/ttyACM0@38400";
+};
+
+// [corrections]: what makes a satellite fix exact. Without them it is good to a metre or two.
+struct CorrectionsConfig {
+  std::string device = "none";  // or "ntrip"
+  std::string link = "tcp:rtk.example.org:2101";
+  std::string mountpoint;
+  std::filesystem::path account;  // File with "user:password"; empty: the caster asks for none.
+  int version = 2;                // Of NTRIP.
+  bool tells_position = false;    // The mountpoint is of a network that must know where it is.
 };
 
 // [obstacles]: a profile scanner that looks level while the robot drives. Without one the robot
@@ -132,6 +143,7 @@ struct RobotConfig {
   ObstaclesConfig obstacles;
   ImuConfig imu;
   GnssConfig gnss;
+  CorrectionsConfig corrections;
   PowerConfig power;
   ConsoleConfig console;
   BatteryConfig battery;

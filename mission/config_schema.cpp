@@ -297,6 +297,28 @@ SectionSpec gnss_section() {
           {}};
 }
 
+SectionSpec corrections_section() {
+  using C = CorrectionsConfig;
+  const Keys<C> keys{[](MissionConfig& c) -> C& { return c.robot.corrections; }};
+  return {
+      ConfigFile::robot,
+      "corrections",
+      "Where a u-blox receiver gets its corrections (RTCM 3); without them a fix is good to a "
+      "metre or two.",
+      {keys.other("device", &C::device, "A caster that speaks NTRIP, or none", {"none", "ntrip"}),
+       keys.other("link", &C::link, "Where the caster is: tcp:HOST:2101"),
+       keys.other("mountpoint", &C::mountpoint, "Which of its streams; RTCM 3, within 30 km"),
+       keys.other("account", &C::account,
+                  "File with one line USER:PASSWORD, which only its owner may read, relative to "
+                  "this file; without it none are sent"),
+       keys.number("version", &C::version, 1, 2, "", "Of NTRIP that the caster is asked in"),
+       keys.other("tells_position", &C::tells_position,
+                  "Whether the mountpoint must be told where the robot is, as one of a network "
+                  "(VRS) must")},
+      {},
+      {}};
+}
+
 SectionSpec power_section() {
   using P = PowerConfig;
   const Keys<P> keys{[](MissionConfig& c) -> P& { return c.robot.power; }};
@@ -355,6 +377,9 @@ SectionSpec scanner_section() {
                       "vlp16 and ouster, which need no pan unit"),
            keys.other("model", &S::model,
                       "Of a Hokuyo: how what it says it is begins, such as `UST-20LX`"),
+           keys.other("api_link", &S::api_link,
+                      "Of an Ouster: where it serves its settings, tcp:HOST:80; without it they "
+                      "are not asked, and what the metadata file says is believed"),
            keys.other("metadata", &S::metadata,
                       "Of an Ouster: file with what it serves at /api/v1/sensor/metadata, relative "
                       "to this file"),
@@ -497,11 +522,12 @@ std::string_view name(ConfigFile file) {
 
 const std::vector<SectionSpec>& config_schema() {
   static const std::vector<SectionSpec> schema{
-      mission_section(),  phase1_section(),  phase2_section(), localize_section(),
-      register_section(), regions_section(), robot_section(),  body_section(),
-      drive_section(),    scanner_section(), pan_section(),    obstacles_section(),
-      imu_section(),      gnss_section(),    power_section(),  console_section(),
-      battery_section(),  sim_section(),     plan_section(),   station_section()};
+      mission_section(),  phase1_section(),  phase2_section(),      localize_section(),
+      register_section(), regions_section(), robot_section(),       body_section(),
+      drive_section(),    scanner_section(), pan_section(),         obstacles_section(),
+      imu_section(),      gnss_section(),    corrections_section(), power_section(),
+      console_section(),  battery_section(), sim_section(),         plan_section(),
+      station_section()};
   return schema;
 }
 

@@ -84,7 +84,8 @@ constexpr FaultNames kFaultNames[] = {
      "unknown command for the name server|unknown command|unknown event|"
      "hub address corrupted|hub address decoding|hub address too long|"
      "hub address expected|not SCIP|wrong model|undefined command|not supported|"
-     "unknown status|not CoLa|other packets"},
+     "unknown status|not CoLa|other packets|not an Ouster|firmware too old|"
+     "another sensor than the metadata's"},
     {"scanner", FaultCode::scanner_refuses_setting,
      "access denied|local condition failed|invalid data|buffer overflow|"
      "buffer underflow|write access denied|method busy|flexible array out of bounds|"
@@ -92,12 +93,15 @@ constexpr FaultNames kFaultNames[] = {
      "asynchronous methods suppressed|complex arrays unsupported|request refused|"
      "impossible sector|parameter error|buffer too small|other|impossible settings|"
      "setting refused|settings differ|not allowed|frequency|resolution|"
-     "frequency and resolution|scan area"},
+     "frequency and resolution|scan area|packet format not supported|"
+     "sends to another port|sends to another computer|sensor in standby"},
     {"scanner", FaultCode::scanner_fault,
      "internal error|thermal shutdown|shot limiting imminent|shot limiting|alert|"
-     "laser off|laser malfunction|processing stopped|hardware fault|device error|error"},
+     "laser off|laser malfunction|processing stopped|hardware fault|device error|error|"
+     "sensor complains"},
     {"scanner", FaultCode::scanner_line_disturbed,
-     "damaged scans|cut request|too few characters|damaged telegrams"},
+     "damaged scans|cut request|too few characters|damaged telegrams|"
+     "settings not answered"},
     {"scanner", FaultCode::scanner_slow,
      "scans too slow|scans get lost|scans come late|scans out of order"},
     {"scanner", FaultCode::scanner_dirty, "pollution warning|pollution error"},
@@ -140,7 +144,13 @@ constexpr FaultNames kFaultNames[] = {
      "fix far from the site|spoofing indicated|spoofing on several signals"},
     {"gnss", FaultCode::gnss_reception, "interference|jammed|antenna short|antenna open"},
     {"gnss", FaultCode::gnss_no_corrections,
-     "no corrections|damaged correction|correction not used"},
+     "no corrections|damaged correction|correction not used|no corrections yet|"
+     "caster not reached|caster lost|caster does not answer|not a caster|"
+     "caster refuses user or password|no such mountpoint|caster refuses|"
+     "caster's answer damaged|caster sends nothing|no RTCM 3 in what the caster sends|"
+     "no position for the caster|corrections damaged|"
+     "corrections repeated or out of order|corrections frozen|corrections slow|"
+     "corrections old|base far away"},
     {"gnss", FaultCode::gnss_line_disturbed,
      "damaged bytes|messages repeated or out of order|messages late|slower than set"},
     {"power", FaultCode::estop_circuit, "e-stop contacts contradict each other|no e-stop input"},

@@ -9,12 +9,13 @@
 #include "drivers/socketcan.hpp"
 #include "drivers/tcp_stream.hpp"
 #include "drivers/udp_port.hpp"
+#include "mission/main_corrections.hpp"
 #include "mission/main_scanner.hpp"
 
 namespace mission {
 namespace {
 
-enum class Kind { can, stream, registers, datagrams };
+enum class Kind { can, stream, tcp, registers, datagrams };
 
 struct Role {
   const char* key;  // In the robot file.
@@ -33,12 +34,16 @@ std::vector<Role> roles_of(const RobotConfig& robot) {
   return {{"drive.link", robot.drive.link, Kind::can, false},
           {"scanner.link", robot.scanner.link,
            needs_pan(robot.scanner) ? Kind::stream : Kind::datagrams, false},
+          {"scanner.api_link", asks_ouster(robot.scanner) ? robot.scanner.api_link : kNone,
+           Kind::tcp, true},
           {"pan.link", needs_pan(robot.scanner) ? robot.pan.link : kNone, Kind::stream,
            !needs_pan(robot.scanner)},
           {"obstacles.link", has_obstacles(robot) ? robot.obstacles.link : kNone, Kind::stream,
            !has_obstacles(robot)},
           {"imu.link", robot.imu.link, Kind::stream, false},
           {"gnss.link", robot.gnss.link, Kind::stream, false},
+          {"corrections.link", has_corrections(robot) ? robot.corrections.link : kNone, Kind::tcp,
+           !has_corrections(robot)},
           {"power.battery_link", robot.power.battery_link, Kind::registers, true},
           {"power.board_link", robot.power.board_link, Kind::registers, true},
           {"power.safety_link", robot.power.safety_link, Kind::registers, true}};
@@ -51,6 +56,7 @@ Kind kind_of(const drivers::LinkAddress& address) {
   if (std::holds_alternative<drivers::ModbusTcpAddress>(address) ||
       std::holds_alternative<drivers::ModbusRtuAddress>(address))
     return Kind::registers;
+  if (std::holds_alternative<drivers::TcpAddress>(address)) return Kind::tcp;
   return std::holds_alternative<drivers::UdpAddress>(address) ? Kind::datagrams : Kind::stream;
 }
 
@@ -61,12 +67,16 @@ std::string problem_of(const Role& role) {
   const auto parsed = drivers::parse_link_address(role.address);
   if (const auto* error = std::get_if<drivers::AddressError>(&parsed)) return error->what;
   const auto& address = std::get<drivers::LinkAddress>(parsed);
-  if (kind_of(address) == role.kind) return "";
+  const Kind kind = kind_of(address);
+  if (kind == role.kind) return "";
+  if (kind == Kind::tcp && role.kind == Kind::stream) return "";
   switch (role.kind) {
     case Kind::can:
       return "a drive hangs on CAN: can:can0 or gs_usb:SERIAL/CHANNEL@500000";
     case Kind::stream:
       return "this device speaks on a stream: serial:/dev/ttyUSB0@9600 or tcp:HOST:PORT";
+    case Kind::tcp:
+      return "this is reached over the network: tcp:HOST:PORT";
     case Kind::datagrams:
       return "this scanner sends packets: udp:PORT, or udp:PORT@ADDRESS for those from there only";
     case Kind::registers:
@@ -85,16 +95,22 @@ drivers::LinkAddress parsed(const std::string& text) {
 
 std::vector<ConfigError> link_problems(const MissionConfig& config) {
   std::vector<ConfigError> errors;
-  for (const Role& role : roles_of(config.robot)) {
-    const std::string problem = problem_of(role);
-    if (problem.empty()) continue;
-    const auto written = config.written.find(std::string("robot.") + role.key);
+  const auto add = [&](const std::string& key, const std::string& value,
+                       const std::string& problem) {
+    const auto written = config.written.find("robot." + key);
     const ConfigPlace place = written == config.written.end()
                                   ? ConfigPlace{config.robot_file.generic_string(), 0, 0}
                                   : written->second;
     errors.push_back({place.file, place.line, place.column,
-                      fmt::format("{} = \"{}\": {}", role.key, role.address, problem)});
-  }
+                      fmt::format("{} = \"{}\": {}", key, value, problem)});
+  };
+  for (const Role& role : roles_of(config.robot))
+    if (const std::string problem = problem_of(role); !problem.empty())
+      add(role.key, role.address, problem);
+  const std::filesystem::path& account = config.robot.corrections.account;
+  if (!has_corrections(config.robot) || account.empty()) return errors;
+  if (const std::string problem = read_account(account).problem; !problem.empty())
+    add("corrections.account", account.generic_string(), problem);
   return errors;
 }
 
@@ -107,10 +123,12 @@ HardwareLinks::HardwareLinks(const RobotConfig& config,
     ends_.pan = open_stream("pan", config.pan.link);
   } else {
     ends_.packets = open_datagrams("scanner", config.scanner.link);
+    if (asks_ouster(config.scanner)) open_scanner_api(config.scanner.api_link);
   }
   if (has_obstacles(config)) ends_.obstacles = open_stream("obstacles", config.obstacles.link);
   ends_.imu = open_stream("imu", config.imu.link);
   ends_.gnss = open_stream("gnss", config.gnss.link);
+  if (has_corrections(config)) open_corrections(config.corrections);
   ends_.power.battery = open_registers("power", config.power.battery_link);
   ends_.power.board = open_registers("power", config.power.board_link);
   ends_.power.safety = open_registers("power", config.power.safety_link);
@@ -151,11 +169,30 @@ hal::ByteStream* HardwareLinks::open_stream(const std::string& role, const std::
     named_.push_back({role, port.get()});
     return port.get();
   }
-  auto stream =
-      std::make_shared<drivers::TcpStream>(std::get<drivers::TcpAddress>(at), executor_, clock_);
+  return &open_tcp(role, address);
+}
+
+drivers::TcpStream& HardwareLinks::open_tcp(const std::string& role, const std::string& address) {
+  auto stream = std::make_shared<drivers::TcpStream>(std::get<drivers::TcpAddress>(parsed(address)),
+                                                     executor_, clock_);
   owned_.push_back(stream);
   named_.push_back({role, stream.get()});
-  return stream.get();
+  return *stream;
+}
+
+void HardwareLinks::open_scanner_api(const std::string& address) {
+  drivers::TcpStream& api = open_tcp("scanner", address);
+  ends_.scanner_api = &api;
+  ends_.drop_scanner_api = [&api] { api.drop(); };
+  ends_.own_address = [&api] { return api.own_address(); };
+}
+
+// The file of the account may have gone since link_problems(): the caster's refusal says the rest.
+void HardwareLinks::open_corrections(const CorrectionsConfig& config) {
+  drivers::TcpStream& caster = open_tcp("corrections", config.link);
+  ends_.corrections = &caster;
+  ends_.drop_corrections = [&caster] { caster.drop(); };
+  if (!config.account.empty()) ends_.account = read_account(config.account);
 }
 
 hal::Datagrams* HardwareLinks::open_datagrams(const std::string& role, const std::string& address) {

@@ -10,7 +10,9 @@
 #include "drivers/flir_ptu.hpp"
 #include "drivers/gpsd_client.hpp"
 #include "drivers/hokuyo.hpp"
+#include "drivers/link_address.hpp"
 #include "drivers/nmea_gnss.hpp"
+#include "drivers/ntrip.hpp"
 #include "drivers/ouster.hpp"
 #include "drivers/sick_lms.hpp"
 #include "drivers/ublox.hpp"
@@ -18,6 +20,7 @@
 #include "drivers/vn100.hpp"
 #include "hal/angles.hpp"
 #include "hal/together.hpp"
+#include "mission/main_corrections.hpp"
 #include "mission/main_scanner.hpp"
 
 namespace mission {
@@ -47,7 +50,26 @@ drivers::Cia402Drive::Config cia402_config(const RobotConfig& config) {
   return result;
 }
 
+// Of a link that may be read.
+std::string tcp_host(const std::string& link) {
+  const auto parsed = drivers::parse_link_address(link);
+  const auto* address = std::get_if<drivers::LinkAddress>(&parsed);
+  const auto* tcp = address != nullptr ? std::get_if<drivers::TcpAddress>(address) : nullptr;
+  return tcp != nullptr ? tcp->host : std::string();
+}
+
 }  // namespace
+
+drivers::OusterApi RobotDrivers::ouster_api(const RobotConfig& config, const Links& links) {
+  drivers::OusterApi api;
+  if (!asks_ouster(config.scanner)) return api;
+  api.config.host = tcp_host(config.scanner.api_link);
+  api.config.port = packets_port(config.scanner);
+  api.config.own_address = links.own_address;
+  api.link = links.scanner_api;
+  api.drop = links.drop_scanner_api;
+  return api;
+}
 
 template <class T>
 T& RobotDrivers::own(std::string role, std::string link, std::unique_ptr<T> device) {
@@ -97,8 +119,8 @@ void RobotDrivers::add_scanner(const RobotConfig& config, const Links& links) {
     add_turning(config, std::make_unique<drivers::Velodyne>(velodyne, clock_, *links.packets));
   } else if (scanner.device == "ouster") {
     drivers::OusterConfig ouster{.scan = {}, .metadata = ouster_file(scanner).metadata};
-    add_turning(config,
-                std::make_unique<drivers::Ouster>(std::move(ouster), clock_, *links.packets));
+    add_turning(config, std::make_unique<drivers::Ouster>(std::move(ouster), clock_, *links.packets,
+                                                          ouster_api(config, links)));
   } else if (scanner.device == "hokuyo") {
     drivers::HokuyoConfig hokuyo;
     hokuyo.model = scanner.model;
@@ -159,9 +181,25 @@ void RobotDrivers::add_gnss(const RobotConfig& config,
              std::make_unique<drivers::GpsdClient>(
                  drivers::GpsdClientConfig{.output = output, .device = {}}, clock_, *links.gnss));
   else
-    gnss_ = &own("gnss", config.gnss.link,
-                 std::make_unique<drivers::Ublox>(
-                     drivers::UbloxConfig{.settings = {}, .output = output}, clock_, *links.gnss));
+    add_ublox(config, output, links);
+}
+
+void RobotDrivers::add_ublox(const RobotConfig& config, const drivers::GnssOutputConfig& output,
+                             const Links& links) {
+  std::unique_ptr<drivers::NtripClient> caster;
+  if (has_corrections(config) && links.corrections != nullptr)
+    caster = std::make_unique<drivers::NtripClient>(
+        drivers::NtripConfig{.request = ntrip_request_of(config.corrections, links.account),
+                             .tells_position = config.corrections.tells_position},
+        clock_, *links.corrections, links.drop_corrections);
+  auto& receiver =
+      own("gnss", config.gnss.link,
+          std::make_unique<drivers::Ublox>(drivers::UbloxConfig{.settings = {}, .output = output},
+                                           clock_, *links.gnss, drivers::SetBaud(), caster.get()));
+  gnss_ = &receiver;
+  if (!caster) return;
+  caster->watch_position([&receiver] { return receiver.output().last(); });
+  own("corrections", config.corrections.link, std::move(caster));
 }
 
 // Ten scans a second are enough for what moves at a walk, and the newest are what counts.

@@ -10,11 +10,14 @@
 #include <vector>
 
 #include "drivers/device.hpp"
+#include "drivers/gnss_output.hpp"
+#include "drivers/ouster.hpp"
 #include "drivers/power_io.hpp"
 #include "drivers/site_frame.hpp"
 #include "drivers/sweep_scanner.hpp"
 #include "hal/clock.hpp"
 #include "hal/devices.hpp"
+#include "mission/account.hpp"
 #include "mission/config.hpp"
 
 namespace mission {
@@ -28,6 +31,7 @@ struct NamedDevice {
 
 // What the table of faults calls that role.
 constexpr std::string_view fault_role(std::string_view named) {
+  if (named == "corrections") return "gnss";
   return named == "obstacles" ? "scanner" : named;
 }
 
@@ -40,7 +44,13 @@ class RobotDrivers {
   struct Links {
     hal::CanBus* drive{};
     hal::ByteStream *scanner{}, *pan{}, *imu{}, *gnss{};
-    hal::ByteStream* obstacles{};   // Null where the robot has none.
+    hal::ByteStream* obstacles{};    // Null where the robot has none.
+    hal::ByteStream* scanner_api{};  // Where an Ouster serves its settings; null: nowhere.
+    std::function<void()> drop_scanner_api{};
+    std::function<std::string()> own_address{};  // As it sees this computer.
+    hal::ByteStream* corrections{};              // Likewise.
+    std::function<void()> drop_corrections{};    // Ends that connection, to be made anew.
+    Account account{};                           // Of their caster.
     hal::Datagrams* packets{};      // Of a scanner that sends them: then no other scanner and pan.
     drivers::PowerIo::Links power;  // Null where the robot has none.
   };
@@ -78,12 +88,15 @@ class RobotDrivers {
  private:
   void add_drive(const RobotConfig& config, const Links& links);
   void add_scanner(const RobotConfig& config, const Links& links);
+  static drivers::OusterApi ouster_api(const RobotConfig& config, const Links& links);
   void add_sweep(const RobotConfig& config, const Links& links, hal::ProfileScanner& profiles,
                  std::function<double()> clock_jitter_s);
   template <class T>
   void add_turning(const RobotConfig& config, std::unique_ptr<T> scanner);
   void add_gnss(const RobotConfig& config, const std::optional<drivers::GeoAnchor>& anchor,
                 const Links& links);
+  void add_ublox(const RobotConfig& config, const drivers::GnssOutputConfig& output,
+                 const Links& links);
   void add_obstacles(const RobotConfig& config, const Links& links);
   void add_power(const RobotConfig& config, const Links& links);
   template <class T>

@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <variant>
 
+#include "drivers/link_address.hpp"
 #include "hal/angles.hpp"
 #include "mission/files.hpp"
+#include "mission/main_corrections.hpp"
 #include "mission/main_robot.hpp"
 
 namespace mission {
@@ -227,7 +230,19 @@ OusterFile ouster_file(const ScannerConfig& scanner) {
     file.problem = "it cannot be read";
   else
     file.problem = drivers::parse_ouster_metadata(*text, file.metadata);
+  if (text) file.text = *text;
   return file;
+}
+
+std::uint16_t packets_port(const ScannerConfig& scanner) {
+  const auto parsed = drivers::parse_link_address(scanner.link);
+  const auto* link = std::get_if<drivers::LinkAddress>(&parsed);
+  const auto* udp = link != nullptr ? std::get_if<drivers::UdpAddress>(link) : nullptr;
+  return udp != nullptr ? udp->port : 0;
+}
+
+bool asks_ouster(const ScannerConfig& scanner) {
+  return scanner.device == "ouster" && !scanner.api_link.empty();
 }
 
 std::vector<ConfigError> robot_problems(const MissionConfig& config) {
@@ -241,6 +256,8 @@ std::vector<ConfigError> robot_problems(const MissionConfig& config) {
     check_hokuyo(robot, problems);
   else
     check_lms(robot, problems);
+  if (const CorrectionsProblem problem = corrections_problem(robot); !problem.text.empty())
+    problems.add(problem.key, problem.text);
   return problems.take();
 }
 

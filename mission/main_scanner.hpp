@@ -2,6 +2,7 @@
 // everything.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "drivers/ouster_codec.hpp"
@@ -31,8 +32,14 @@ drivers::ScipParameters hokuyo_parameters(const std::string& model);
 // What the metadata file of an Ouster holds, or what is wrong with it.
 struct OusterFile {
   drivers::OusterMetadata metadata;
+  std::string text;     // As it stands there.
   std::string problem;  // Empty: nothing.
 };
 OusterFile ouster_file(const ScannerConfig& scanner);
+
+// Where a scanner's packets are expected: of a link udp:PORT; 0: of another one.
+std::uint16_t packets_port(const ScannerConfig& scanner);
+// Whether there is an Ouster that is to be asked for its settings.
+bool asks_ouster(const ScannerConfig& scanner);
 
 }  // namespace mission

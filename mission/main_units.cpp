@@ -2,6 +2,7 @@
 
 #include "hal/angles.hpp"
 #include "hal/together.hpp"
+#include "mission/main_corrections.hpp"
 #include "mission/main_scanner.hpp"
 
 namespace mission {
@@ -9,6 +10,7 @@ namespace {
 
 constexpr double kArcsecPerStep = 46.2857;  // A PTU-E46-70 in half steps.
 constexpr double kObstacleRangeMax_m = 20;  // Of a UST-20LX.
+constexpr double kBaseNorth_deg = 0.03;     // 3.3 km: a base of the neighbourhood.
 constexpr double kShortRangeMax_m = 65;     // What an LMS5xx can tell in millimetres.
 
 drivers::agilex::Limits limits_of(const std::string& device) {
@@ -31,12 +33,14 @@ RobotUnits::RobotUnits(const RobotConfig& config, const drivers::GeoAnchor& anch
     : seed_(seed), world_(world), clock_(clock), supply_(sim::BatteryConfig{}, world) {
   if (links.drive) add_drive(config, links);
   if (links.scanner && links.pan && needs_pan(config.scanner)) add_sweep(config, threads, links);
-  if (links.packets && !needs_pan(config.scanner)) add_turning(config.scanner, *links.packets);
+  if (links.packets && !needs_pan(config.scanner)) add_turning(config.scanner, links);
   if (links.imu)
     imu_.emplace(sim::Vn100UnitConfig{}, world_, clock_, *links.imu, add_faults("imu"));
   if (links.gnss) add_gnss(config, anchor, links);
   if (links.obstacles && config.obstacles.device != "none") add_obstacles(config, threads, links);
   add_power(config.power);
+  if (links.corrections && has_corrections(config))
+    add_corrections(config.corrections, anchor, *links.corrections);
 }
 
 RobotUnits::~RobotUnits() = default;
@@ -111,14 +115,20 @@ void RobotUnits::add_obstacles(const RobotConfig& config, int threads, const Uni
   obstacles_.emplace(hokuyo, world_, clock_, *links.obstacles, add_faults("obstacles"), level_);
 }
 
-void RobotUnits::add_turning(const ScannerConfig& config, sim::DatagramSender& packets) {
+void RobotUnits::add_turning(const ScannerConfig& config, const UnitLinks& links) {
+  sim::DatagramSender& packets = *links.packets;
   if (config.device == "ouster") {
     sim::OusterUnitConfig ouster;
-    ouster.metadata = ouster_file(config).metadata;
+    const OusterFile file = ouster_file(config);
+    ouster.metadata = file.metadata;
+    ouster.metadata_text = file.text;
+    ouster.settings.udp_port_lidar =
+        links.packets_port != 0 ? links.packets_port : packets_port(config);
     ouster.ranges = world_.config().scanner;
     ouster.seed = seed_;
     ouster.blind_in_motion = true;
-    ouster_.emplace(std::move(ouster), world_, clock_, packets, add_faults("scanner"));
+    ouster_.emplace(std::move(ouster), world_, clock_, packets, add_faults("scanner"),
+                    asks_ouster(config) ? links.scanner_api : nullptr);
     return;
   }
   sim::VelodyneUnitConfig velodyne;
@@ -155,6 +165,16 @@ void RobotUnits::add_power(const PowerConfig& config) {
   if (!config.safety_link.empty()) pilz_.emplace(add_faults("safety"));
 }
 
+void RobotUnits::add_corrections(const CorrectionsConfig& config, const drivers::GeoAnchor& anchor,
+                                 hal::ByteStream& end) {
+  sim::NtripUnitConfig caster;
+  caster.mountpoint = config.mountpoint;
+  caster.version = config.version == 1 ? drivers::NtripVersion::v1 : drivers::NtripVersion::v2;
+  caster.wants_position = config.tells_position;
+  caster.base = {anchor.latitude_deg + kBaseNorth_deg, anchor.longitude_deg, anchor.height_m};
+  caster_.emplace(std::move(caster), clock_, end, add_faults("corrections"));
+}
+
 hal::Task<void> RobotUnits::run() {
   std::vector<hal::Task<void>> loops;
   const auto add = [&](auto& unit) {
@@ -173,6 +193,7 @@ hal::Task<void> RobotUnits::run() {
   add(nmea_);
   add(gpsd_);
   add(board_);
+  add(caster_);
   co_await hal::together(std::move(loops));
 }
 
@@ -185,6 +206,8 @@ SimulatedRobot::SimulatedRobot(const RobotConfig& config, const drivers::GeoAnch
       imu_(clock),
       gnss_(clock),
       obstacles_(clock),
+      corrections_(clock),
+      scanner_api_(clock),
       packets_(clock) {
   hal::CanBus& drivers_end = can_.attach();
   const UnitLinks ends{.drive = &can_.attach(),
@@ -194,7 +217,10 @@ SimulatedRobot::SimulatedRobot(const RobotConfig& config, const drivers::GeoAnch
                        .imu = &imu_.b(),
                        .gnss = &gnss_.b(),
                        .obstacles = &obstacles_.b(),
-                       .packets = &packets_.sender()};
+                       .corrections = &corrections_.b(),
+                       .packets = &packets_.sender(),
+                       .scanner_api = &scanner_api_.b(),
+                       .packets_port = 0};
   units_ = std::make_unique<RobotUnits>(config, anchor, seed, threads, world, clock, ends);
   const auto registers = [&](sim::RegisterUnit* unit) -> hal::Registers* {
     if (!unit) return nullptr;
@@ -208,6 +234,20 @@ SimulatedRobot::SimulatedRobot(const RobotConfig& config, const drivers::GeoAnch
                           .imu = &imu_.a(),
                           .gnss = &gnss_.a(),
                           .obstacles = &obstacles_.a(),
+                          .scanner_api = &scanner_api_.a(),
+                          .drop_scanner_api =
+                              [this] {
+                                scanner_api_.cut();
+                                scanner_api_.mend();
+                              },
+                          .own_address = {},
+                          .corrections = &corrections_.a(),
+                          .drop_corrections =
+                              [this] {
+                                corrections_.cut();
+                                corrections_.mend();
+                              },
+                          .account = {},
                           .packets = &packets_.receiver(),
                           .power = {.battery = registers(units_->battery()),
                                     .gateway = nullptr,

@@ -20,6 +20,7 @@
 #include "sim/hokuyo_unit.hpp"
 #include "sim/links.hpp"
 #include "sim/nmea_unit.hpp"
+#include "sim/ntrip_unit.hpp"
 #include "sim/ouster_unit.hpp"
 #include "sim/power_units.hpp"
 #include "sim/sick_lms_unit.hpp"
@@ -38,12 +39,14 @@ inline constexpr drivers::GeoAnchor kSimAnchor{48.0, 11.0, 500, 0};
 struct UnitLinks {
   // An AgileX base uses the first end of the bus, two CiA 402 drives one each.
   hal::CanBus *drive{}, *second_drive{};
-  hal::ByteStream *scanner{}, *pan{}, *imu{}, *gnss{}, *obstacles{};
+  hal::ByteStream *scanner{}, *pan{}, *imu{}, *gnss{}, *obstacles{}, *corrections{};
   sim::DatagramSender* packets{};  // Of a scanner that turns by itself.
+  hal::ByteStream* scanner_api{};  // Where that serves its settings.
+  std::uint16_t packets_port{};    // Where it says that it sends to; 0: as in the robot file.
 };
 
 // Which faults the units have, by role: "drive", "drive2" (the right one of two), "scanner", "pan",
-// "obstacles", "imu", "gnss", "battery", "board", "safety".
+// "obstacles", "imu", "gnss", "battery", "board", "safety", "corrections".
 class RobotUnits {
  public:
   RobotUnits(const RobotConfig& config, const drivers::GeoAnchor& anchor, std::uint64_t seed,
@@ -71,10 +74,12 @@ class RobotUnits {
   void add_drive(const RobotConfig& config, const UnitLinks& links);
   void add_sweep(const RobotConfig& config, int threads, const UnitLinks& links);
   void add_obstacles(const RobotConfig& config, int threads, const UnitLinks& links);
-  void add_turning(const ScannerConfig& config, sim::DatagramSender& packets);
+  void add_turning(const ScannerConfig& config, const UnitLinks& links);
   void add_gnss(const RobotConfig& config, const drivers::GeoAnchor& anchor,
                 const UnitLinks& links);
   void add_power(const PowerConfig& config);
+  void add_corrections(const CorrectionsConfig& config, const drivers::GeoAnchor& anchor,
+                       hal::ByteStream& end);
 
   const std::uint64_t seed_;
   sim::World& world_;
@@ -96,6 +101,7 @@ class RobotUnits {
   std::optional<sim::VictronUnit> victron_;
   std::optional<sim::RelayUnit> board_;
   std::optional<sim::PilzUnit> pilz_;
+  std::optional<sim::NtripUnit> caster_;
 };
 
 // The same on links in memory, with the other ends for the drivers.
@@ -112,7 +118,7 @@ class SimulatedRobot {
 
  private:
   sim::CanWire can_;
-  sim::StreamWire scanner_, pan_, imu_, gnss_, obstacles_;
+  sim::StreamWire scanner_, pan_, imu_, gnss_, obstacles_, corrections_, scanner_api_;
   sim::DatagramWire packets_;
   std::unique_ptr<RobotUnits> units_;
   std::vector<std::unique_ptr<sim::RegisterWire>> registers_;

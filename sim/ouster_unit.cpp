@@ -1,16 +1,29 @@
 #include "sim/ouster_unit.hpp"
 
+#include <array>
+#include <boost/asio/experimental/awaitable_operators.hpp>
 #include <cmath>
 
+#include "drivers/http.hpp"
+#include "drivers/text.hpp"
+
 namespace sim {
+namespace {
+constexpr hal::Duration kHttpPause = std::chrono::milliseconds(100);
+constexpr std::size_t kHeardMax = 8192;
+}  // namespace
 
 OusterUnit::OusterUnit(OusterUnitConfig config, World& world, hal::Clock& clock,
-                       DatagramSender& link, UnitFaults& faults)
+                       DatagramSender& link, UnitFaults& faults, hal::ByteStream* http)
     : config_(std::move(config)),
       world_(world),
       clock_(clock),
       faults_(faults),
-      link_(link, clock, faults) {
+      link_(link, clock, faults),
+      metadata_text_(config_.metadata_text.empty() ? sample_ouster_metadata()
+                                                   : config_.metadata_text),
+      settings_(config_.settings) {
+  if (http != nullptr) http_.emplace(*http, clock, faults);
   const drivers::OusterMetadata& m = config_.metadata;
   const std::size_t pixels = m.rows * m.columns_per_packet;
   packet_.init_id = 7;
@@ -40,6 +53,41 @@ OusterUnit::OusterUnit(OusterUnitConfig config, World& world, hal::Clock& clock,
 OusterUnit::~OusterUnit() = default;
 
 hal::Task<void> OusterUnit::run() {
+  using boost::asio::experimental::awaitable_operators::operator&&;
+  if (!http_)
+    co_await send_packets();
+  else
+    co_await (send_packets() && serve());
+}
+
+hal::Task<void> OusterUnit::serve() {
+  std::array<std::uint8_t, 1024> piece;
+  for (std::string heard;;) {
+    const auto size = co_await http_->read_some(piece);
+    if (!size) {
+      heard.clear();
+      co_await clock_.sleep_for(kHttpPause);
+      continue;
+    }
+    heard += drivers::as_text(drivers::ByteView(piece).first(*size));
+    if (heard.size() > kHeardMax) heard.clear();
+    while (const auto asked = drivers::parse_http_get(heard)) {
+      heard.erase(0, asked->size);
+      const std::string answer = answer_to(asked->path);
+      (void)co_await http_->write(drivers::as_bytes(answer), static_cast<int>(asked->path.size()));
+    }
+  }
+}
+
+std::string OusterUnit::answer_to(const std::string& path) const {
+  const auto ok = [](const std::string& json) { return drivers::http_answer(200, json); };
+  if (path == drivers::kOusterMetadataPath && !metadata_text_.empty()) return ok(metadata_text_);
+  if (path == drivers::kOusterSettingsPath) return ok(drivers::ouster_settings_json(settings_));
+  if (path == drivers::kOusterAlertsPath) return ok(drivers::ouster_alerts_json(alerts_));
+  return drivers::http_answer(404, "{}");
+}
+
+hal::Task<void> OusterUnit::send_packets() {
   const drivers::OusterMetadata& m = config_.metadata;
   const double packets_per_turn =
       static_cast<double>(m.columns_per_frame) / static_cast<double>(m.columns_per_packet);

@@ -1,8 +1,11 @@
 // An Ouster OS in the simulated world: real packets of whatever profile its metadata name.
 #pragma once
 
+#include <optional>
 #include <string>
+#include <vector>
 
+#include "drivers/ouster_api.hpp"
 #include "drivers/ouster_codec.hpp"
 #include "hal/clock.hpp"
 #include "sim/links.hpp"
@@ -21,6 +24,9 @@ struct OusterUnitConfig {
   // While the robot moves, beams tell what they told before: nobody may use a scan taken in motion,
   // and to cast all these beams would cost more than the rest of a mission.
   bool blind_in_motion{};
+  // What it serves over HTTP; metadata_text empty: sample_ouster_metadata().
+  std::string metadata_text;
+  drivers::OusterSettings settings{"255.255.255.255", 7502, "NORMAL"};
 };
 
 // The metadata of an OS-1-32 at 1024 columns, as the sensor serves them.
@@ -30,21 +36,32 @@ std::string sample_ouster_metadata();
 // factor, and time stamps that run so much faster.
 class OusterUnit {
  public:
+  // `http`: where it is asked for its settings; null: nowhere.
   OusterUnit(OusterUnitConfig config, World& world, hal::Clock& clock, DatagramSender& link,
-             UnitFaults& faults);
+             UnitFaults& faults, hal::ByteStream* http = nullptr);
   ~OusterUnit();
 
   hal::Task<void> run();
   void set_thermal_shutdown(bool on) { packet_.thermal_shutdown = on; }
+  drivers::OusterSettings& settings() { return settings_; }
+  std::vector<drivers::OusterAlert>& alerts() { return alerts_; }
+  void serve_metadata(std::string text) { metadata_text_ = std::move(text); }  // Empty: 404.
 
  private:
   void measure(hal::Time at);
+  hal::Task<void> send_packets();
+  hal::Task<void> serve();
+  std::string answer_to(const std::string& path) const;
 
   const OusterUnitConfig config_;
   World& world_;
   hal::Clock& clock_;
   UnitFaults& faults_;
   FaultySender link_;
+  std::optional<FaultyStream> http_;
+  std::string metadata_text_;
+  drivers::OusterSettings settings_;
+  std::vector<drivers::OusterAlert> alerts_;
   drivers::OusterPacket packet_;
   std::vector<Eigen::Vector3d> S_origins_m_, S_directions_;  // Row by row, by measurement.
   std::vector<BeamRay> rays_;

@@ -9,7 +9,7 @@ vantage_together(vantage_codecs drivers
   "canopen_codec canopen_faults canopen_offline canopen_pdo canopen_sdo sweep_assembly"
   "gnss_demux gnss_offline ouster_codec ouster_metadata ouster_offline ublox_startup"
   "gpsd_codec pan_fit sick_lms_encode sick_lms_offline sick_lms_startup"
-  "nmea_codec nmea_epochs recognise velodyne_codec waveshare_map"
+  "nmea_codec nmea_epochs nmea_gga recognise velodyne_codec waveshare_map"
   "clock_fit resync vn100_codec vn100_encode vn100_frames")
 vantage_together(vantage_drivers drivers
   "flir_ptu link_trouble ouster peers tcp_stream"
@@ -30,6 +30,6 @@ vantage_together(vantage_sim sim
   "nmea_unit")
 vantage_together(vantage_backends mission
   "main_gate main_hardware main_links main_robot main_scanner main_sim main_units main_worker"
-  "main_run main_watch")
+  "main_corrections main_run main_watch")
 vantage_together(make_sites tools
   "make_sites make_sites_courtyard make_sites_model make_sites_shapes make_sites_site")

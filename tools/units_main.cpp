@@ -18,6 +18,7 @@
 #include "drivers/real_clock.hpp"
 #include "drivers/socketcan.hpp"
 #include "hal/together.hpp"
+#include "mission/main_corrections.hpp"
 #include "mission/main_run.hpp"
 #include "mission/main_scanner.hpp"
 #include "mission/main_units.hpp"
@@ -42,7 +43,7 @@ struct Served {
   std::unique_ptr<vantage::ServedTcp> scanner, obstacles, battery, safety;
   std::unique_ptr<vantage::ServedPty> scanner_line, pan, imu, gnss, board;
   std::unique_ptr<vantage::ServedUdp> packets;
-  std::unique_ptr<vantage::ServedTcp> gpsd;
+  std::unique_ptr<vantage::ServedTcp> gpsd, corrections, scanner_api;
 };
 
 constexpr std::string_view kSerial = "serial:";
@@ -78,6 +79,8 @@ Served serve(const Options& options, const mission::RobotConfig& robot, asio::io
     served.gpsd = port();
   else
     served.gnss = pty("gnss", kGnssBaud);
+  if (mission::asks_ouster(robot.scanner)) served.scanner_api = port();
+  if (mission::has_corrections(robot)) served.corrections = port();
   if (!robot.power.battery_link.empty()) served.battery = port();
   if (!robot.power.board_link.empty()) served.board = pty("board", kBoardBaud);
   if (!robot.power.safety_link.empty()) served.safety = port();
@@ -103,6 +106,7 @@ void print_links(const Options& options, const mission::RobotConfig& robot, cons
     fmt::print("[drive]\ndevice = \"{}\"\nlink = \"can:{}\"\n", robot.drive.device, options.can);
   fmt::print("[scanner]\ndevice = \"{}\"\nlink = \"{}\"\n", robot.scanner.device,
              scanner_link(served));
+  if (served.scanner_api) fmt::print("api_link = \"{}\"\n", tcp(*served.scanner_api));
   if (served.pan) fmt::print("[pan]\nlink = \"{}\"\n", serial(*served.pan, kPanBaud));
   if (served.obstacles)
     fmt::print("[obstacles]\ndevice = \"{}\"\nlink = \"{}\"\n", robot.obstacles.device,
@@ -110,6 +114,7 @@ void print_links(const Options& options, const mission::RobotConfig& robot, cons
   fmt::print("[imu]\nlink = \"{}\"\n[gnss]\ndevice = \"{}\"\nlink = \"{}\"\n",
              serial(*served.imu, kImuBaud), robot.gnss.device,
              served.gpsd ? tcp(*served.gpsd) : serial(*served.gnss, kGnssBaud));
+  if (served.corrections) fmt::print("[corrections]\nlink = \"{}\"\n", tcp(*served.corrections));
   if (served.battery || served.board || served.safety) fmt::print("[power]\n");
   if (served.battery)
     fmt::print("battery_link = \"modbus-tcp:127.0.0.1:{}/225\"\n", served.battery->port());
@@ -180,7 +185,10 @@ int run(const Options& options) {
        .imu = served.imu.get(),
        .gnss = served.gpsd ? static_cast<hal::ByteStream*>(served.gpsd.get()) : served.gnss.get(),
        .obstacles = served.obstacles.get(),
-       .packets = served.packets.get()});
+       .corrections = served.corrections.get(),
+       .packets = served.packets.get(),
+       .scanner_api = served.scanner_api.get(),
+       .packets_port = served.packets ? served.packets->port() : std::uint16_t{0}});
   print_links(options, robot, served);
 
   std::vector<hal::Task<void>> tasks;

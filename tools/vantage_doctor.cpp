@@ -68,11 +68,13 @@ bool healthy(const mission::NamedDevice& named, const mission::HardwareLinks& li
 
 void print_device(const mission::NamedDevice& named, const mission::HardwareLinks& links) {
   const drivers::Identity& who = named.device->identity();
-  fmt::print("{:8} {:18} {:34} {}\n", named.role, named.device->model(), named.link,
+  fmt::print("{:11} {:18} {:34} {}\n", named.role, named.device->model(), named.link,
              healthy(named, links) ? "healthy" : name(named.device->state()));
   if (!who.model.empty() || !who.maker.empty())
     fmt::print("         {} {}, serial {}, firmware {}\n", who.maker, who.model,
                who.serial.empty() ? "?" : who.serial, who.firmware.empty() ? "?" : who.firmware);
+  if (const std::string condition = named.device->condition(); !condition.empty())
+    fmt::print("         {}\n", condition);
   for (const drivers::Trouble& trouble : troubles_of(named, links))
     fmt::print("         {}{}{}\n           because: {}\n           do: {}\n", trouble.fault->name,
                trouble.detail.empty() ? "" : ": ", trouble.detail, trouble.fault->cause,
@@ -97,6 +99,7 @@ boost::json::object device_json(const mission::NamedDevice& named,
           {"model", who.model},
           {"serial", who.serial},
           {"firmware", who.firmware},
+          {"condition", named.device->condition()},
           {"troubles", std::move(troubles)}};
 }
 

@@ -403,6 +403,100 @@ TEST_F(AgilexLoop, LosesNoTravelWhileTheCableIsUnplugged) {
   EXPECT_GT(step_max_m, 0.2) << "the rest came in one report";
 }
 
+// The host's clock and its end of the bus when the process is held up: what is due meanwhile comes
+// at the end of that, timers first, and frames wait with the times at which they arrived.
+class HeldUp final : public hal::Clock, public hal::CanBus {
+ public:
+  HeldUp(sim::SimClock& clock, hal::CanBus& bus) : clock_(clock), bus_(bus) {}
+
+  void hold(hal::Duration span) { until_ = clock_.now() + span; }
+
+  hal::Time now() const override { return clock_.now(); }
+  hal::Task<void> sleep_until(hal::Time wake) override {
+    co_await clock_.sleep_until(wake);
+    if (clock_.now() < until_) co_await clock_.sleep_until(until_);
+  }
+  hal::Task<hal::Result<void>> send(hal::CanFrame frame, hal::Time deadline) override {
+    return bus_.send(frame, deadline);
+  }
+  hal::Task<hal::Result<hal::ReceivedFrame>> receive() override {
+    auto received = co_await bus_.receive();
+    if (clock_.now() < until_) co_await clock_.sleep_until(until_ + 10us);
+    co_return received;
+  }
+
+ private:
+  sim::SimClock& clock_;
+  hal::CanBus& bus_;
+  hal::Time until_{};
+};
+
+struct AgilexHeldUp : AgilexLoop, testing::WithParamInterface<std::chrono::milliseconds> {
+  std::unique_ptr<HeldUp> host_side;
+  std::vector<hal::Time> silent, not_running;
+
+  void make_held_up() {
+    host_side = std::make_unique<HeldUp>(clock, host);
+    make_unit();
+    drive = std::make_unique<drivers::AgilexDrive>(drivers::AgilexDrive::Config{}, *host_side,
+                                                   *host_side);
+    spawn(look());  // First: it sees the moment before anything that waits was heard.
+    spawn(drive->run());
+    spawn(odometer(*drive));
+  }
+  hal::Task<void> look() {
+    for (;;) {
+      co_await host_side->sleep_for(1ms);
+      if (drive->status().silent) silent.push_back(clock.now());
+      if (drive->state() != DeviceState::running) not_running.push_back(clock.now());
+    }
+  }
+};
+
+TEST_P(AgilexHeldUp, ABaseThatWentOnTalkingIsNotSilent) {
+  make_held_up();
+  wait(1s);
+  ASSERT_EQ(drive->state(), DeviceState::running);
+  silent.clear();
+  not_running.clear();
+  for (int i = 0; i < 7; ++i) {  // At other moments of its cycle each time.
+    wait(503ms);
+    host_side->hold(GetParam());
+    wait(GetParam() + 1ms);
+    const auto answer = run(drive->command({0.1, 0}));
+    EXPECT_TRUE(answer) << answer.error().message();
+  }
+  wait(1s);
+  EXPECT_TRUE(silent.empty()) << silent.size() << " times";
+  EXPECT_TRUE(not_running.empty()) << not_running.size() << " times";
+  EXPECT_EQ(host.lost_frames(), 0U);
+  EXPECT_NEAR(heard_m(), world.driven_m(), 0.001) << "no travel is lost";
+  EXPECT_EQ(troubles(), "");
+}
+
+// The same when the base really fell silent meanwhile: that shows as soon as all is heard.
+TEST_P(AgilexHeldUp, ABaseThatFellSilentMeanwhileIs) {
+  make_held_up();
+  wait(1s);
+  silent.clear();
+  faults.set({UnitFault::off, 0});
+  const hal::Time off = clock.now();
+  host_side->hold(GetParam());
+  wait(GetParam());
+  wait(300ms);
+  ASSERT_FALSE(silent.empty());
+  EXPECT_LE(silent.front() - off, std::max<hal::Duration>(GetParam() + 10ms, 260ms));
+  EXPECT_TRUE(says("no reports from the base")) << troubles();
+  faults.clear();
+  wait(2s);
+  EXPECT_EQ(drive->state(), DeviceState::running);
+}
+
+INSTANTIATE_TEST_SUITE_P(ForALittleAndForLong, AgilexHeldUp,
+                         testing::Values(100ms, 150ms, 250ms, 400ms), [](const auto& param) {
+                           return "ms" + std::to_string(param.param.count());
+                         });
+
 TEST_F(AgilexLoop, APowerCycleIsNoJump) {
   sim::AgilexUnit::Config config;
   config.odometry_mm = 500;  // So near zero that a jump would look like travel.

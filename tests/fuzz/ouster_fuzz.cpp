@@ -1,7 +1,9 @@
-// Metadata and, after the first NUL, a packet of the sensor that they describe.
+// What an Ouster tells over HTTP; metadata and, after the first NUL, a packet of the sensor that
+// they describe.
 #include <cmath>
 #include <string_view>
 
+#include "drivers/ouster_api.hpp"
 #include "drivers/ouster_codec.hpp"
 #include "drivers/text.hpp"
 #include "tests/fuzz/stream_fuzz.hpp"
@@ -10,6 +12,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace drivers;
   const std::string_view text = as_text(ByteView(data, size));
   const auto cut = std::min(text.find('\0'), text.size());
+  OusterSettings settings;
+  if (parse_ouster_settings(text, settings).empty()) {
+    const std::string again = ouster_settings_json(settings);
+    drivers_fuzz::require(parse_ouster_settings(again, settings).empty());
+  }
+  std::vector<OusterAlert> alerts;
+  if (parse_ouster_alerts(text, alerts).empty()) drivers_fuzz::require(alerts.size() <= 64);
+  ouster_version(text);
   OusterMetadata metadata;
   if (!parse_ouster_metadata(text.substr(0, cut), metadata).empty()) return 0;
   drivers_fuzz::require(metadata.beam_altitude_deg.size() == metadata.rows);

@@ -109,6 +109,7 @@ TEST_F(GsUsb, RestartsAfterBusOffButNotForEver) {
     fake.go_bus_off(0);
     pass(50ms);
     EXPECT_EQ(fault(first), value(LinkFault::bus_off));
+    EXPECT_NE(first.troubles()[0].fault->remedy.find("bit rate"), std::string_view::npos);
     EXPECT_EQ(send(first, {1, 0}), errc::make_error_code(errc::network_down));
     pass(100ms);
     EXPECT_TRUE(first.troubles().empty());
@@ -148,6 +149,7 @@ TEST_F(GsUsb, NamesADisturbedBusAndCountsWhatTheAdapterLost) {
   fake.hear(0, {7, 0}, true);
   pass(10ms);
   EXPECT_EQ(fault(first), value(LinkFault::bus_passive));
+  EXPECT_NE(first.troubles()[0].fault->remedy.find("bit rate"), std::string_view::npos);
   EXPECT_EQ(first.lost_frames(), 1U);
 }
 

@@ -133,11 +133,29 @@ TEST_P(ShippedRobots, AreHealthyButForTheMissingCan) {
 
 INSTANTIATE_TEST_SUITE_P(All, ShippedRobots,
                          testing::Values("avenue.toml", "bunker_vlp16.toml", "scout_ouster.toml",
-                                         "scout_hokuyo.toml", "mini_lms111.toml"),
+                                         "scout_hokuyo.toml", "mini_lms111.toml",
+                                         "scout_looking.toml"),
                          [](const auto& param) {
                            const std::string name = param.param;
                            return name.substr(0, name.find('.'));
                          });
+
+// The caster's address, mountpoint and version are the robot file's; what flows is told.
+TEST_F(DoctorTest, SaysHowOldCorrectionsAreAndWhyThereAreNone) {
+  start_units("pan none", shipped("scout_looking.toml"));
+  auto devices = diagnose("15");
+  EXPECT_TRUE(devices["corrections"].at("healthy").as_bool()) << names(devices["corrections"]);
+  const std::string condition(devices["corrections"].at("condition").as_string());
+  EXPECT_NE(condition.find("base 3.3 km away"), std::string::npos) << condition;
+  EXPECT_NE(devices["gnss"].at("condition").as_string().find("since the last came"),
+            std::string::npos);
+  std::string robot = test::read_text(robot_);
+  robot.replace(robot.find("\"SITE0\""), 7, "\"SITE1\"");
+  robot_ = write("wrong.toml", robot);
+  devices = diagnose("6");
+  EXPECT_NE(names(devices["corrections"]).find("no such mountpoint"), std::string::npos)
+      << names(devices["corrections"]);
+}
 
 TEST_F(DoctorTest, FindsAHokuyoOnASerialLine) {
   std::string robot = shipped("scout_hokuyo.toml");
