@@ -304,6 +304,8 @@ hal::Task<void> Survey::refine() {
     std::vector<NextView> views;
     const std::function<void()> look = [&] { views = choose_views(); };
     co_await parts_.compute.run(look);
+    // Once only: what cannot be reached in its place either is left to next best views.
+    if (std::exchange(no_way_, false) && !replacements_.contains(stop.name)) co_await replace(t, s);
     if (views.empty() && scans_closed_ < static_cast<int>(record_.scans.size())) {
       co_await close_tour();
       continue;  // The map may show something worth seeing now.
@@ -421,6 +423,7 @@ void Survey::note_leg(const LegEnd& leg) {
   moving.obstacles_met += leg.obstacles_met;
   moving.waited_s += leg.waited_s;
   if (leg.arrived) moving.short_max_m = std::max(moving.short_max_m, leg.short_of_goal_m);
+  no_way_ = !leg.arrived && stop.station != nullptr;
 }
 
 hal::Task<bool> Survey::carry(const Stop& stop, ScanRecord& scan) {

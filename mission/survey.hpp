@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -26,6 +27,7 @@
 #include "mission/store.hpp"
 #include "mission/surroundings.hpp"
 #include "mission/survey_orders.hpp"
+#include "planning/replacement.hpp"
 
 namespace mission {
 
@@ -125,6 +127,13 @@ class Survey {
   void note_moving();
   void note_leg(const LegEnd& leg);
   // In survey_energy.cpp.
+  void redo(const StationReplaced& replaced);
+  // In survey_replace.cpp.
+  hal::Task<void> replace(std::size_t task, int dropped);
+  planning::Replacements find_instead(std::size_t task, int dropped) const;
+  std::vector<std::vector<planning::WallPiece>> walls_kept(std::size_t task) const;
+  void add_station(std::size_t task, std::string name, planning::Station station);
+  void note_instead(const StationReplaced& replaced);
   double way_s(const hal::Pose2& from, const hal::Pose2& to) const;
   std::vector<double> legs_ahead_s(const Stop& stop);
   bool affords(const Stop& stop);
@@ -218,6 +227,8 @@ class Survey {
   bool battery_low_{};               // For the last stop that was thought of.
   bool put_off_{};  // The stop was not visited: the stations left get a new order first.
   std::optional<Progress> shown_;
+  bool no_way_{};   // The stop was dropped because no road leads there any more.
+  std::set<std::string> replacements_;  // Names of stations in place of others.
   Eigen::Vector2d zone_at_m_{0, 0};  // Where the zone was looked up last.
   std::optional<double> zone_speed_mps_;
   CloudMerger cloud_;

@@ -6,6 +6,7 @@
 
 #include "mission/json_text.hpp"
 #include "mission/survey.hpp"
+#include "planning/spans.hpp"
 
 namespace mission {
 
@@ -108,6 +109,20 @@ void Survey::redo(const TourClosed& closed) {
 void Survey::redo(const StationDropped& dropped) {
   record_.dropped.push_back(dropped.station);
   if (dropped.view) model_->exclude(dropped.view->cell.voxel);
+}
+
+void Survey::redo(const StationReplaced& replaced) {
+  const auto area = [](const AreaPlan& plan) -> const std::string& { return plan.area.name; };
+  const auto plan = std::ranges::find(record_.plans, replaced.area, area);
+  if (plan == record_.plans.end()) return;
+  const auto t = static_cast<std::size_t>(plan - record_.plans.begin());
+  for (const StationReplaced::Station& station : replaced.stations) {
+    const planning::Candidate at{nav::to_mm(station.at.position_m), station.at.heading_rad};
+    auto sees = planning::visible_walls(at, plan->walls, sensor_limits(config_.robot.scanner));
+    const double sees_m = planning::nm_to_m(planning::length_nm(planning::spans_of(sees)));
+    add_station(t, station.name, {at, std::move(sees), sees_m, station.adds_m, station.overlaps_m});
+  }
+  note_instead(replaced);
 }
 
 // Points in W are written from what was measured wherever they are not whole, or as from an earlier
