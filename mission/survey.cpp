@@ -293,17 +293,18 @@ hal::Task<void> Survey::tour(std::size_t t) {
                     .pose = pose_of(station.at),
                     .station = &station,
                     .view = nullptr};
+    bool scanned = false;
     if (std::ranges::count(parts_.skip, stop.name) > 0)
       drop(stop, "skipped, as the operator asked");
     else
-      co_await visit(stop);
+      scanned = co_await visit(stop);
     if (std::exchange(put_off_, false)) {
       co_await retour(t, at);
       continue;
     }
     ++at;
     ++stations_done_;
-    covered_m_ += station.adds_m;
+    if (scanned) covered_m_ += station.adds_m;
     // Once only: what cannot be reached in its place either is left to next best views.
     if (std::exchange(no_way_, false) && !replacements_.contains(stop.name)) co_await replace(t, s);
   }

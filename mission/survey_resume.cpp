@@ -149,6 +149,7 @@ void Survey::tour_the_rest() {
   std::set<std::pair<std::string, std::string>> done;
   for (const ScanRecord& scan : record_.scans)
     if (!scan.next_best_view) done.emplace(scan.area, scan.name);
+  const auto scanned = done;
   for (const DroppedStation& station : record_.dropped) done.emplace(station.area, station.name);
   for (std::size_t t = 0; t < record_.plans.size(); ++t) {
     AreaPlan& plan = record_.plans[t];
@@ -157,7 +158,8 @@ void Survey::tour_the_rest() {
     });
     dealt_with_[t] = static_cast<std::size_t>(rest.begin() - plan.tour.begin());
     for (auto s = plan.tour.begin(); s != rest.begin(); ++s)
-      covered_m_ += plan.cover.stations[static_cast<std::size_t>(*s)].adds_m;
+      if (scanned.contains({plan.area.name, station_name(plan, *s)}))
+        covered_m_ += plan.cover.stations[static_cast<std::size_t>(*s)].adds_m;
     stations_done_ += dealt_with_[t];
     if (static_cast<int>(t) != tasks_.start_area || dealt_with_[t] == 0) continue;
     tours_next_ = dealt_with_[t];
