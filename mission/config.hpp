@@ -19,6 +19,10 @@ struct BodyConfig {
   double track_m = 0.6;
   double speed_max_mps = 1.0;
   double turn_max_degps = 45;
+  // Of the ground that it drives on; steeper ground and higher steps are closed to it when a scan
+  // shows them.
+  double slope_max_deg = 15;
+  double step_max_m = 0.1;
 };
 
 // [scanner] of the robot file.

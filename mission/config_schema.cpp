@@ -197,16 +197,23 @@ SectionSpec robot_section() {
 SectionSpec body_section() {
   using B = BodyConfig;
   const Keys<B> keys{[](MissionConfig& c) -> B& { return c.robot.body; }};
-  return {ConfigFile::robot,
-          "body",
-          "Its size and speed.",
-          {keys.number("radius_m", &B::radius_m, 0.05, 5, "m",
-                       "Of the circle that holds the whole robot"),
-           keys.number("track_m", &B::track_m, 0.05, 5, "m", "Between left and right wheels"),
-           keys.number("speed_max_mps", &B::speed_max_mps, 0.01, 10, "m/s", "Driving straight"),
-           keys.number("turn_max_degps", &B::turn_max_degps, 1, 360, "deg/s", "Turning")},
-          {},
-          {}};
+  return {
+      ConfigFile::robot,
+      "body",
+      "Its size and speed.",
+      {keys.number("radius_m", &B::radius_m, 0.05, 5, "m",
+                   "Of the circle that holds the whole robot"),
+       keys.number("track_m", &B::track_m, 0.05, 5, "m", "Between left and right wheels"),
+       keys.number("speed_max_mps", &B::speed_max_mps, 0.01, 10, "m/s", "Driving straight"),
+       keys.number("turn_max_degps", &B::turn_max_degps, 1, 360, "deg/s", "Turning"),
+       keys.number("slope_max_deg", &B::slope_max_deg, 1, 45, "deg",
+                   "Steepest ground that it drives on; what scans show to be steeper is closed "
+                   "to it"),
+       keys.number("step_max_m", &B::step_max_m, 0.03, 1, "m",
+                   "Highest step that it drives up or down, likewise; a step that is no steeper "
+                   "than `slope_max_deg` over 0.25 m counts as a slope")},
+      {},
+      {}};
 }
 
 SectionSpec drive_section() {

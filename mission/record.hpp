@@ -87,12 +87,20 @@ struct ScanRecord {
   void claim(const Eigen::Matrix3d& of_pose);
 };
 
+// What is scanned from in place of a station that no road led to.
+struct Instead {
+  double lost_m{};                    // Wall that no other station and no scan in hand sees.
+  double left_m{};                    // Of that, what these stations do not see either.
+  std::vector<std::string> stations;  // None: no place is worth a scan.
+};
+
 // A station that was planned and not scanned.
 struct DroppedStation {
   std::string name;
   std::string area;
   hal::Pose2 planned;
   std::string reason;
+  std::optional<Instead> instead = std::nullopt;  // Nothing: it was not asked for.
 };
 
 // Phase I for one free area.
@@ -101,8 +109,9 @@ struct AreaPlan {
   std::string mode;  // "robot" or "manual"
   std::vector<planning::Wall> walls;
   planning::CoverPlan cover;
-  std::vector<std::string> names;  // Of cover.stations, as a plan file calls them; else empty.
-  std::vector<int> tour;           // Order in which cover.stations are visited.
+  // Of cover.stations, as a plan file calls them, or for what they stand in; else empty.
+  std::vector<std::string> names;
+  std::vector<int> tour;  // Order in which cover.stations are visited.
   double tour_m{};
   std::vector<std::vector<Eigen::Vector2d>> way_m;      // Of the tour, leg by leg; empty: unknown.
   std::vector<std::vector<Eigen::Vector2d>> roadmap_m;  // Polylines of the Voronoi roadmap.

@@ -373,16 +373,32 @@ std::string pose_table(const RunRecord& run) {
   return table.empty() ? "" : table.html();
 }
 
+namespace {
+
+// What became of the wall that only that station would have seen.
+std::string in_words(const std::optional<Instead>& instead) {
+  if (!instead) return "-";
+  std::string text = number(instead->lost_m, 1) + " m of wall that nothing else sees";
+  if (instead->lost_m <= 0) return "nothing is lost: others see all that it would have";
+  if (instead->stations.empty()) return text + ": no place is worth a scan";
+  std::string names;
+  for (const std::string& name : instead->stations) names += (names.empty() ? "" : ", ") + name;
+  return text + ": " + number(instead->lost_m - instead->left_m, 1) + " m of it from " + names;
+}
+
+}  // namespace
+
 std::string dropped_table(const RunRecord& run) {
   Table table({{"Station", Align::word},
                {"Area", Align::word},
                {"x m"},
                {"y m"},
-               {"Why it was not scanned", Align::text}});
+               {"Why it was not scanned", Align::text},
+               {"What is scanned instead", Align::text}});
   for (const DroppedStation& station : run.dropped) {
     table.row({escaped(station.name), escaped(station.area),
                number(station.planned.position_m.x(), 1), number(station.planned.position_m.y(), 1),
-               escaped(station.reason)});
+               escaped(station.reason), escaped(in_words(station.instead))});
   }
   return table.empty() ? "<p>None.</p>\n" : table.html();
 }

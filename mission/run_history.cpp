@@ -228,6 +228,23 @@ void describe(Fields& fields, StationDropped& of) {
 }
 
 template <class Fields>
+void describe(Fields& fields, StationReplaced::Station& of) {
+  fields("name", of.name);
+  fields("at", of.at);
+  fields("adds_m", of.adds_m);
+  fields("overlaps_m", of.overlaps_m);
+}
+
+template <class Fields>
+void describe(Fields& fields, StationReplaced& of) {
+  fields("area", of.area);
+  fields("name", of.name);
+  fields("lost_m", of.lost_m);
+  fields("left_m", of.left_m);
+  fields("stations", of.stations);
+}
+
+template <class Fields>
 void describe(Fields& fields, RunEnded& of) {
   fields("completed", of.completed);
   fields("reason", of.reason);
@@ -287,6 +304,14 @@ void take_closing(RunHistory& history, const json::value& value) {
   history.steps.emplace_back(std::move(closed));
 }
 
+void take_replacement(RunHistory& history, const json::value& value) {
+  auto replaced = read_as<StationReplaced>(value);
+  if (history.planned)
+    for (const StationReplaced::Station& station : replaced.stations)
+      history.planned->stations.emplace_back(replaced.area, station.name);
+  history.steps.emplace_back(std::move(replaced));
+}
+
 void take_resumed(RunHistory& history, const json::value& value) {
   const auto resumed = read_as<RunResumed>(value);
   if (resumed.scan_lost) {
@@ -314,6 +339,7 @@ const std::map<std::string, Take>& takes() {
       {"scan", take_scan},
       {"tour_closed", take_closing},
       {"dropped", [](auto& h, const auto& v) { h.steps.emplace_back(read_as<StationDropped>(v)); }},
+      {"replaced", take_replacement},
       {"stopped",
        [](auto& h, const auto& v) { h.last_stop = std::string(v.at("what").as_string()); }},
       {"ended", [](auto& h, const auto& v) { h.ended = read_as<RunEnded>(v); }},
@@ -366,6 +392,9 @@ EventText event_of(const TourClosed& event) {
 }
 EventText event_of(const StationDropped& event) {
   return text_of("dropped", event);
+}
+EventText event_of(const StationReplaced& event) {
+  return text_of("replaced", event);
 }
 EventText event_of(const RunEnded& event) {
   return text_of("ended", event);

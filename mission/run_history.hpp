@@ -87,6 +87,18 @@ struct StationDropped {
   std::optional<NextView> view;  // Phase II.
 };
 
+// Stations in place of one that was dropped; they are then stations of the plan as all others.
+struct StationReplaced {
+  struct Station {
+    std::string name;
+    hal::Pose2 at;  // On the 1 mm grid.
+    double adds_m{}, overlaps_m{};
+  };
+  std::string area, name;  // Of the one that was dropped.
+  double lost_m{}, left_m{};
+  std::vector<Station> stations;
+};
+
 struct RunEnded {
   bool completed{};
   std::string reason;
@@ -98,7 +110,7 @@ struct RunResumed {
   std::optional<int> scan_lost;  // Damaged: taken again. Always the last.
 };
 
-using RunStep = std::variant<LegDone, ScanDone, TourClosed, StationDropped>;
+using RunStep = std::variant<LegDone, ScanDone, TourClosed, StationDropped, StationReplaced>;
 
 struct RunHistory {
   std::optional<RunBegun> begun;
@@ -130,6 +142,7 @@ EventText event_of(const LegDone& event);
 EventText event_of(const ScanDone& event);
 EventText event_of(const TourClosed& event);
 EventText event_of(const StationDropped& event);
+EventText event_of(const StationReplaced& event);
 EventText event_of(const RunEnded& event);
 EventText event_of(const RunResumed& event);
 EventText event_of(const Whereabouts& event);  // On the way.

@@ -9,7 +9,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "hal/angles.hpp"
 #include "nav/polygons.hpp"
+#include "nav/terrain.hpp"
 
 namespace mission {
 namespace {
@@ -27,6 +29,29 @@ constexpr std::uint8_t kObstacleHitsMin = 4;
 
 // How far a wall may stand from where map and pose put it, as seen by the scanner.
 constexpr double kWallsMarginM = 0.15;
+
+constexpr double kGroundRangeM = 12;  // Of points that tell how rough the ground is.
+
+// The part of a grid around a place.
+struct Window {
+  Window(const nav::RasterGrid& of, const Eigen::Vector2d& W_center_m, double reach_m) : all(of) {
+    const auto at = [&](double reach) -> Eigen::Vector2i {
+      const Eigen::Vector2d q = (W_center_m.array() + reach - of.W_min_m.array()) / of.cell_m;
+      return q.array().floor().cast<int>().max(0).min(Eigen::Array2i(of.nx, of.ny));
+    };
+    low = at(-reach_m);
+    const Eigen::Vector2i size = at(reach_m) - low;
+    grid = {of.W_min_m + of.cell_m * low.cast<double>(), of.cell_m, size.x(), size.y()};
+  }
+  int x(std::size_t i) const { return static_cast<int>(i) % grid.nx; }
+  int y(std::size_t i) const { return static_cast<int>(i) / grid.nx; }
+  std::size_t cell(std::size_t i) const { return all.index(low.x() + x(i), low.y() + y(i)); }
+  Eigen::Vector2d center_m(std::size_t i) const { return grid.center_m(x(i), y(i)); }
+
+  const nav::RasterGrid& all;
+  Eigen::Vector2i low{0, 0};
+  nav::RasterGrid grid;
+};
 
 struct Bounds {
   Eigen::Vector2d low{1e18, 1e18}, high{-1e18, -1e18};
@@ -134,6 +159,7 @@ SiteModel::SiteModel(const MissionConfig& config, const nav::SiteMap& map,
                     static_cast<int>(std::ceil(grid.ny * grid.voxel_m / kObstacleCellM))};
   open_.assign(obstacle_grid_.size(), 0);
   hits_.assign(obstacle_grid_.size(), 0);
+  rough_.assign(obstacle_grid_.size(), 0);
   for (const AreaTask& task : tasks_) {
     const auto open =
         nav::rasterize(nav::offset(task.area.drivable, -kKnownWallMarginMm), obstacle_grid_);
@@ -229,7 +255,39 @@ ScanEffect SiteModel::add(const hal::ScanCloud& scan,
   for (const Eigen::Vector3f& W_point_m : W_points_m)
     if ((W_point_m - W_scanner_m).squaredNorm() < kObstacleRangeMaxM * kObstacleRangeMaxM)
       note_obstacle(W_point_m, ground_z_m, effect);
+  note_ground(W_points_m, T_W_S.translation().head<2>(), ground_z_m, effect);
   return effect;
+}
+
+// Around the scanner only: farther off, points lie too far apart to tell a step. The robot stands
+// where it stands: the ground under it is good enough.
+void SiteModel::note_ground(const std::vector<Eigen::Vector3f>& W_points_m,
+                            const Eigen::Vector2d& W_scanner_m, double ground_z_m,
+                            ScanEffect& effect) {
+  const BodyConfig& body = config_.robot.body;
+  const Window around(obstacle_grid_, W_scanner_m, kGroundRangeM);
+  const nav::TerrainLimits limits{.slope_max_rad = hal::radians(body.slope_max_deg),
+                                  .step_max_m = body.step_max_m,
+                                  .footprint_m = body.radius_m,
+                                  .range_max_m = kGroundRangeM,
+                                  .overhead_m = kBodyHighM,
+                                  .ground_z_m = ground_z_m};
+  std::vector<float> heights_m = nav::ground_heights(W_points_m, W_scanner_m, around.grid, limits);
+  for (std::size_t i = 0; i < heights_m.size(); ++i)
+    if (!open_[around.cell(i)]) heights_m[i] = std::numeric_limits<float>::quiet_NaN();
+  const std::vector<nav::Ground> ground = nav::judge_ground(heights_m, around.grid, limits);
+  for (std::size_t i = 0; i < ground.size(); ++i) {
+    const Eigen::Vector2d center_m = around.center_m(i);
+    const bool is_rough = ground[i] == nav::Ground::step || ground[i] == nav::Ground::slope;
+    const bool under_robot = (center_m - W_scanner_m).norm() < body.radius_m + kObstacleCellM;
+    if (!is_rough || under_robot || !open_[around.cell(i)] || rough_[around.cell(i)]) continue;
+    rough_[around.cell(i)] = 1;
+    effect.rough_ground_m.push_back(center_m);
+  }
+}
+
+double SiteModel::rough_ground_m2() const {
+  return kObstacleCellM * kObstacleCellM * static_cast<double>(std::ranges::count(rough_, 1));
 }
 
 void SiteModel::take_up(const SiteModel& before) {

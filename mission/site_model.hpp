@@ -64,6 +64,8 @@ struct ScanEffect {
   int layers_added{};                  // To the box, because scans saw higher.
   std::vector<Eigen::Vector2d>
       new_obstacles_m;  // Centres of 0.25 m cells that the map has as free.
+  // Of such cells whose ground is too steep, or a step, for the robot: new ones.
+  std::vector<Eigen::Vector2d> rough_ground_m;
 };
 
 class SiteModel {
@@ -153,6 +155,8 @@ class SiteModel {
   std::size_t voxel_bytes() const;
   const std::vector<ViewCell>& cells() const { return cells_; }
   Eigen::Vector3d cell_position_m(const ViewCell& cell) const;
+  // That scans showed to be too steep for the robot, or a step.
+  double rough_ground_m2() const;
 
  private:
   static constexpr int kTriesMax = 2;
@@ -173,6 +177,8 @@ class SiteModel {
   planning::Voxel numbered(std::uint64_t number) const;
   bool is_in_site(const planning::Voxel& v) const;
   bool is_set_aside(const planning::Voxel& v) const;
+  void note_ground(const std::vector<Eigen::Vector3f>& W_points_m,
+                   const Eigen::Vector2d& W_scanner_m, double ground_z_m, ScanEffect& effect);
   void note_obstacle(const Eigen::Vector3f& W_point_m, double ground_z_m, ScanEffect& effect);
 
   const MissionConfig config_;
@@ -198,8 +204,9 @@ class SiteModel {
   std::uint64_t set_aside_{};
 
   nav::RasterGrid obstacle_grid_;
-  std::vector<std::uint8_t> open_;  // 1 where the map says free, well away from every known wall.
-  std::vector<std::uint8_t> hits_;  // Points seen there at the height of the robot, up to 255.
+  std::vector<std::uint8_t> open_;   // 1 where the map says free, well away from every known wall.
+  std::vector<std::uint8_t> hits_;   // Points seen there at the height of the robot, up to 255.
+  std::vector<std::uint8_t> rough_;  // 1 where the robot cannot drive for the ground.
 };
 
 }  // namespace mission

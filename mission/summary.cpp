@@ -167,10 +167,15 @@ json::object scan_json(const RunRecord& record, std::size_t index) {
 json::array dropped_json(const RunRecord& record) {
   json::array dropped;
   for (const DroppedStation& station : record.dropped) {
-    dropped.push_back({{"name", station.name},
-                       {"area", station.area},
-                       {"planned", pose_json(station.planned)},
-                       {"reason", station.reason}});
+    json::object object{{"name", station.name},
+                        {"area", station.area},
+                        {"planned", pose_json(station.planned)},
+                        {"reason", station.reason}};
+    if (station.instead)
+      object["instead"] = {{"lost_m", mm(station.instead->lost_m)},
+                           {"left_m", mm(station.instead->left_m)},
+                           {"stations", json::value_from(station.instead->stations)}};
+    dropped.push_back(std::move(object));
   }
   return dropped;
 }

@@ -135,6 +135,7 @@ hal::Task<void> Survey::run() {
   note_gnss();
   note_registration();
   note_moving();
+  note_ground();
   note_energy();
   record_.set_aside = model_->voxels_set_aside();
   record_.thin_set_aside = model_->thin_set_aside();
@@ -218,6 +219,14 @@ void Survey::note_box() {
         outside, points));
 }
 
+void Survey::note_ground() {
+  if (const double rough_m2 = model_->rough_ground_m2(); rough_m2 > 0)
+    record_.notes.push_back(
+        fmt::format("scans show {:.1f} m2 of ground that is steeper than slope_max_deg = {} or a "
+                    "step of more than step_max_m = {} m: the robot keeps off it",
+                    rough_m2, config_.robot.body.slope_max_deg, config_.robot.body.step_max_m));
+}
+
 void Survey::note_moving() {
   const MovingFacts& moving = record_.moving;
   if (moving.obstacles_met > 0 || moving.waited_s >= 1)
@@ -284,17 +293,20 @@ hal::Task<void> Survey::tour(std::size_t t) {
                     .pose = pose_of(station.at),
                     .station = &station,
                     .view = nullptr};
+    bool scanned = false;
     if (std::ranges::count(parts_.skip, stop.name) > 0)
       drop(stop, "skipped, as the operator asked");
     else
-      co_await visit(stop);
+      scanned = co_await visit(stop);
     if (std::exchange(put_off_, false)) {
       co_await retour(t, at);
       continue;
     }
     ++at;
     ++stations_done_;
-    covered_m_ += station.adds_m;
+    if (scanned) covered_m_ += station.adds_m;
+    // Once only: what cannot be reached in its place either is left to next best views.
+    if (std::exchange(no_way_, false) && !replacements_.contains(stop.name)) co_await replace(t, s);
   }
   if (static_cast<int>(t) == tasks_.start_area) note_forecasts();
 }
@@ -412,6 +424,7 @@ hal::Task<bool> Survey::drive(const Stop& stop, ScanRecord& scan) {
   tell_leg(stop, leg);
   if (leg.drive_lost) throw CannotGoOn(fmt::format("on the way to {}: {}", stop.name, leg.reason));
   if (!leg.arrived) drop(stop, leg.reason);
+  no_way_ = !leg.arrived && stop.station != nullptr;
   co_return leg.arrived;
 }
 
@@ -529,6 +542,7 @@ void Survey::merge(const hal::ScanCloud& cloud, const Stop& stop, ScanRecord& sc
           {"predicted_voxels", scan.predicted_voxels},
           {"resolved_voxels", scan.resolved_voxels},
           {"new_obstacle_cells", effect.new_obstacles_m.size()},
+          {"rough_ground_cells", effect.rough_ground_m.size()},
           {"box_layers_added", effect.layers_added}});
   record_.scans.push_back(std::move(scan));
 }
@@ -552,14 +566,17 @@ ScanEffect Survey::insert(const hal::ScanCloud& cloud,
   }
   ScanEffect effect = model_->add(cloud, W_points_m, T_W_S, scan.ground_z_m);
   if (stop.view) scan.resolved_voxels = model_->settle();
-  close_roads(effect.new_obstacles_m);
+  close_roads(effect);
   return effect;
 }
 
-// What the scans show and the map lacks closes the robot's roads through it.
-void Survey::close_roads(const std::vector<Eigen::Vector2d>& obstacles_m) {
+// What the scans show and the map lacks closes the robot's roads through it: obstacles, and ground
+// that is too rough.
+void Survey::close_roads(const ScanEffect& effect) {
   if (tasks_.start_area < 0) return;
-  roads_[static_cast<std::size_t>(tasks_.start_area)].close(obstacles_m, SiteModel::kObstacleCellM);
+  std::vector<Eigen::Vector2d> closed_m = effect.new_obstacles_m;
+  closed_m.insert(closed_m.end(), effect.rough_ground_m.begin(), effect.rough_ground_m.end());
+  roads_[static_cast<std::size_t>(tasks_.start_area)].close(closed_m, SiteModel::kObstacleCellM);
 }
 
 void Survey::drop(const Stop& stop, const std::string& reason) {

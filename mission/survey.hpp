@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -26,6 +27,7 @@
 #include "mission/store.hpp"
 #include "mission/surroundings.hpp"
 #include "mission/survey_orders.hpp"
+#include "planning/replacement.hpp"
 
 namespace mission {
 
@@ -123,7 +125,15 @@ class Survey {
   void note_box();
   void note_gnss();
   void note_moving();
+  void note_ground();
   void note_leg(const LegEnd& leg);
+  void redo(const StationReplaced& replaced);
+  // In survey_replace.cpp.
+  hal::Task<void> replace(std::size_t task, int dropped);
+  planning::Replacements find_instead(std::size_t task, int dropped) const;
+  std::vector<std::vector<planning::WallPiece>> walls_kept(std::size_t task) const;
+  void add_station(std::size_t task, std::string name, planning::Station station);
+  void note_instead(const StationReplaced& replaced);
   // In survey_energy.cpp.
   double way_s(const hal::Pose2& from, const hal::Pose2& to) const;
   std::vector<double> legs_ahead_s(const Stop& stop);
@@ -178,7 +188,7 @@ class Survey {
   hal::Task<void> leave(std::string reason, bool stopped_for_gain);
   void note_leftover(bool stopped_for_gain);
   void drop(const Stop& stop, const std::string& reason);
-  void close_roads(const std::vector<Eigen::Vector2d>& obstacles_m);
+  void close_roads(const ScanEffect& effect);
   void decide(const boost::json::object& decision);
   void show(const Stop& stop);
   double now_s() const { return before_s_ + hal::seconds(parts_.clock.now() - began_); }
@@ -217,6 +227,8 @@ class Survey {
   std::size_t tours_next_{};         // Station of it after the one that is next.
   bool battery_low_{};               // For the last stop that was thought of.
   bool put_off_{};  // The stop was not visited: the stations left get a new order first.
+  bool no_way_{};   // The stop was dropped because no road leads there any more.
+  std::set<std::string> replacements_;  // Names of stations in place of others.
   std::optional<Progress> shown_;
   Eigen::Vector2d zone_at_m_{0, 0};  // Where the zone was looked up last.
   std::optional<double> zone_speed_mps_;

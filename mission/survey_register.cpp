@@ -282,7 +282,7 @@ void Survey::fill_anew(bool save) {
       cloud.add(W_points_m);
       const ScanEffect effect = anew->add(measured, W_points_m, T_W_S, scan.ground_z_m);
       scan.points_outside_box = effect.points_outside_box;
-      close_roads(effect.new_obstacles_m);
+      close_roads(effect);
     }
     scan.after = anew->counts();
   }

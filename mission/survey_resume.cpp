@@ -6,6 +6,7 @@
 
 #include "mission/json_text.hpp"
 #include "mission/survey.hpp"
+#include "planning/spans.hpp"
 
 namespace mission {
 
@@ -110,6 +111,20 @@ void Survey::redo(const StationDropped& dropped) {
   if (dropped.view) model_->exclude(dropped.view->cell.voxel);
 }
 
+void Survey::redo(const StationReplaced& replaced) {
+  const auto area = [](const AreaPlan& plan) -> const std::string& { return plan.area.name; };
+  const auto plan = std::ranges::find(record_.plans, replaced.area, area);
+  if (plan == record_.plans.end()) return;
+  const auto t = static_cast<std::size_t>(plan - record_.plans.begin());
+  for (const StationReplaced::Station& station : replaced.stations) {
+    const planning::Candidate at{nav::to_mm(station.at.position_m), station.at.heading_rad};
+    auto sees = planning::visible_walls(at, plan->walls, sensor_limits(config_.robot.scanner));
+    const double sees_m = planning::nm_to_m(planning::length_nm(planning::spans_of(sees)));
+    add_station(t, station.name, {at, std::move(sees), sees_m, station.adds_m, station.overlaps_m});
+  }
+  note_instead(replaced);
+}
+
 // Points in W are written from what was measured wherever they are not whole, or as from an earlier
 // pose: the run was cut off while they were corrected.
 void Survey::mend_scans() {
@@ -134,6 +149,7 @@ void Survey::tour_the_rest() {
   std::set<std::pair<std::string, std::string>> done;
   for (const ScanRecord& scan : record_.scans)
     if (!scan.next_best_view) done.emplace(scan.area, scan.name);
+  const auto scanned = done;
   for (const DroppedStation& station : record_.dropped) done.emplace(station.area, station.name);
   for (std::size_t t = 0; t < record_.plans.size(); ++t) {
     AreaPlan& plan = record_.plans[t];
@@ -142,7 +158,8 @@ void Survey::tour_the_rest() {
     });
     dealt_with_[t] = static_cast<std::size_t>(rest.begin() - plan.tour.begin());
     for (auto s = plan.tour.begin(); s != rest.begin(); ++s)
-      covered_m_ += plan.cover.stations[static_cast<std::size_t>(*s)].adds_m;
+      if (scanned.contains({plan.area.name, station_name(plan, *s)}))
+        covered_m_ += plan.cover.stations[static_cast<std::size_t>(*s)].adds_m;
     stations_done_ += dealt_with_[t];
     if (static_cast<int>(t) != tasks_.start_area || dealt_with_[t] == 0) continue;
     tours_next_ = dealt_with_[t];

@@ -135,6 +135,8 @@ radius_m = 0.25
 track_m = 0.3
 speed_max_mps = 2
 turn_max_degps = 90
+slope_max_deg = 20
+step_max_m = 0.15
 [drive]
 device = "cia402"
 link = "can:can1"
@@ -255,6 +257,8 @@ robot.body.radius_m=0.25
 robot.body.track_m=0.3
 robot.body.speed_max_mps=2
 robot.body.turn_max_degps=90
+robot.body.slope_max_deg=20
+robot.body.step_max_m=0.15
 robot.drive.device=cia402
 robot.drive.link=can:can1
 robot.drive.left_node=3

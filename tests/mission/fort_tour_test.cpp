@@ -2,14 +2,17 @@
 // corners of the ground on which the robot can stand, which no way with the same clearance beats.
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <limits>
 #include <queue>
 
 #include "mission/check.hpp"
+#include "mission/main_run.hpp"
 #include "mission/plan.hpp"
 #include "mission/site_io.hpp"
 #include "nav/polygons.hpp"
 #include "planning/tour.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace fort_tour_tests {
 namespace {
@@ -141,6 +144,45 @@ TEST(FortTour, IsWithinTenPercentOfTheShortestOnTheVisibilityGraph) {
       100 * (plan.tour_m / shortest.cost - 1));
   EXPECT_GE(plan.tour_m, 0.98 * shortest.cost) << "a tour shorter than the shortest";
   EXPECT_LE(plan.tour_m, 1.10 * shortest.cost);
+}
+
+// What the wheels roll in a mission without next best views, home included, against the shortest
+// tour through the places where the scans were to be taken.
+TEST(FortTour, IsDrivenWithinTenPercentOfTheShortestOnTheVisibilityGraph) {
+  const auto configs = std::filesystem::path(VANTAGE_SOURCE_DIR) / "configs";
+  const test::TempFolder folder;
+  std::ofstream(folder.path() / "fort.toml")
+      << "robot = \"" << (configs / "robots/scout_lms511.toml").string() << "\"\nsite = \""
+      << (configs / "sites/fort").string()
+      << "\"\n[regions]\ninner = \"robot\"\nouter = \"skip\"\nmoat = \"skip\"\n"
+         "[phase1]\ncoverage_goal = 0.985\ngain_min = 0.005\n[phase2]\nviews_max = 0\n";
+  mission::Prepared ready =
+      mission::prepare(folder.path() / "fort.toml",
+                       {.site_folder = {}, .robot_file = {}, .has_seed = false, .seed = 0},
+                       mission::WorldUse::world);
+  ASSERT_TRUE(ready.errors.empty());
+  const mission::RunRecord record = mission::run_in_simulation(ready, {.out = folder.path() / "run",
+                                                                       .judge_cells = {},
+                                                                       .threads = 2,
+                                                                       .progress = nullptr,
+                                                                       .terminal = false})
+                                        .record;
+  ASSERT_TRUE(record.completed) << record.end;
+  ASSERT_TRUE(record.dropped.empty());
+  const Eigen::Vector2d start_m = record.map.start->position_m;
+  std::vector<Vector2d> places_m{start_m};
+  for (const mission::ScanRecord& scan : record.scans) places_m.push_back(scan.planned.position_m);
+  ASSERT_GE(places_m.size(), 5U);
+  VisibilityGraph graph(record.plans.at(0).area.standable);
+  const planning::Tour shortest =
+      planning::solve_tour({.cost = graph.lengths_m(places_m), .start = 0, .closed = true});
+  std::printf(
+      "fort: driven %.1f m, tour %.1f m, shortest on the visibility graph %.1f m: %.1f %%\n",
+      record.driven_total_m, record.plans[0].tour_m, shortest.cost,
+      100 * (record.driven_total_m / shortest.cost - 1));
+  // The robot may end a leg a few centimetres before its goal.
+  EXPECT_GE(record.driven_total_m, 0.98 * shortest.cost);
+  EXPECT_LE(record.driven_total_m, 1.10 * shortest.cost);
 }
 
 }  // namespace

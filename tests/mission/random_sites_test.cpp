@@ -98,7 +98,8 @@ Outcome run(const RandomSite& site) {
 }
 
 struct Sums {
-  int missions{}, stations{}, scanned{}, dropped{}, views_dropped{}, met{}, legs{};
+  int missions{}, stations{}, scanned{}, dropped{}, instead{}, views_dropped{}, met{}, legs{};
+  int rough{};  // Sites whose ground is closed in places.
   double waited_s{}, driven_m{}, hours{}, nearest_person_m = 1e9;
   std::map<std::string, int> reasons;
 
@@ -109,6 +110,10 @@ struct Sums {
     scanned += static_cast<int>(record.scans.size());
     for (const auto& drop : record.dropped)
       ++(drop.name.starts_with("NBV") ? views_dropped : dropped);
+    for (const auto& drop : record.dropped)
+      if (drop.instead) instead += static_cast<int>(drop.instead->stations.size());
+    for (const std::string& note : record.notes)
+      rough += note.find("keeps off it") != std::string::npos;
     met += record.moving.obstacles_met;
     legs += record.moving.legs;
     waited_s += record.moving.waited_s;
@@ -121,10 +126,11 @@ struct Sums {
   void print() const {
     std::printf(
         "%d missions, %.1f h, %.1f km: %d times something was in the way on %d legs, waited %.0f "
-        "s; %d "
-        "scans; %d of %d stations and %d views dropped; people came as near as %.2f m\n",
+        "s; %d scans; %d of %d stations and %d views dropped, %d stations instead; ground closed "
+        "on "
+        "%d sites; people came as near as %.2f m\n",
         missions, hours, driven_m / 1000, met, legs, waited_s, scanned, dropped, stations,
-        views_dropped, nearest_person_m);
+        views_dropped, instead, rough, nearest_person_m);
     for (const auto& [reason, count] : reasons) std::printf("  %d: %s\n", count, reason.c_str());
   }
 };

@@ -15,12 +15,14 @@
 #include <set>
 
 #include "mission/beams_file.hpp"
+#include "tests/mission/killed_run.hpp"
 #include "tests/mission/mission_site.hpp"
 
 namespace {
 
 namespace fs = std::filesystem;
 using mission::RunOutcome;
+using mission_test::Killer;
 using testing::HasSubstr;
 
 // Four houses at a crossing, and the program run on them as vantaged runs it.
@@ -105,20 +107,6 @@ std::vector<std::uint64_t> measured(const mission::RunHistory& history) {
 bool begins_with(const std::vector<std::uint64_t>& all, const std::vector<std::uint64_t>& first) {
   return all.size() >= first.size() && std::equal(first.begin(), first.end(), all.begin());
 }
-
-// Kills the program at the call number `n` that changes a file, or at the first that opens a file
-// of that name.
-class Killer final : public mission::FileCalls {
- public:
-  explicit Killer(std::string name) : name_(std::move(name)) {}
-  int open(const char* path, int flags, unsigned mode) override {
-    if (std::string_view(path).ends_with(name_)) raise(SIGKILL);
-    return FileCalls::open(path, flags, mode);
-  }
-
- private:
-  const std::string name_;
-};
 
 TEST(Resume, TheProductsAreThoseOfARunThatWasNotCut) {
   const Crossing whole, cut;
