@@ -1,5 +1,8 @@
 #include "mission/roads.hpp"
 
+#include <algorithm>
+#include <utility>
+
 #include "nav/polygons.hpp"
 
 namespace mission {
@@ -13,6 +16,12 @@ nav::Polygons squares(const std::vector<Eigen::Vector2d>& centers_m, double side
     rings.push_back({low, {high.x, low.y}, high, {low.x, high.y}});
   }
   return nav::normalise(rings);
+}
+
+bool same(const nav::Polygons& a, const nav::Polygons& b) {
+  return std::ranges::equal(a, b, [](const nav::Polygon& p, const nav::Polygon& q) {
+    return p.outer == q.outer && p.holes == q.holes;
+  });
 }
 
 }  // namespace
@@ -49,7 +58,9 @@ bool Roads::reopen() {
 }
 
 void Roads::rebuild() {
-  area_.drivable = closed_for_now_.empty() ? open_ : nav::subtract(open_, closed_for_now_);
+  nav::Polygons drivable = closed_for_now_.empty() ? open_ : nav::subtract(open_, closed_for_now_);
+  if (same(drivable, area_.drivable)) return;  // Closed, or open, already.
+  area_.drivable = std::move(drivable);
   area_.standable = nav::offset(area_.drivable, -nav::to_mm({robot_radius_m_, 0}).x);
   roadmap_ = nav::Roadmap::build(area_, robot_radius_m_);
 }

@@ -102,7 +102,8 @@ Correction Localizer::add(const LocalizerEvent& event) {
   // Most come in order: look from the end.
   auto at = history_.end();
   while (at != history_.begin() && after(*std::prev(at))) --at;
-  filter_ = at == history_.begin() ? oldest_ : std::prev(at)->after;
+  const bool latest = at == history_.end();  // The filter is that of the last entry already.
+  if (!latest) filter_ = at == history_.begin() ? oldest_ : std::prev(at)->after;
   Correction correction;
   const bool gated = event.index() >= 2;
   correction.gate = filter_.apply(config_, event);
@@ -110,10 +111,14 @@ Correction Localizer::add(const LocalizerEvent& event) {
     correction.nis = filter_.last_nis();
     correction.dimension = filter_.last_dimension();
   }
-  at = std::next(history_.insert(at, Entry{stamp, event, filter_}));
-  for (; at != history_.end(); ++at) {
-    filter_.apply(config_, at->event);
-    at->after = filter_;
+  if (latest) {
+    history_.emplace_back(stamp, event, filter_);
+  } else {
+    at = std::next(history_.insert(at, Entry{stamp, event, filter_}));
+    for (; at != history_.end(); ++at) {
+      filter_.apply(config_, at->event);
+      at->after = filter_;
+    }
   }
   forget(history_.back().stamp);
   return correction;
