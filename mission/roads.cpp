@@ -33,9 +33,24 @@ Roads::Roads(nav::FreeArea area, double robot_radius_m)
       robot_radius_m_(robot_radius_m),
       roadmap_(nav::Roadmap::build(area_, robot_radius_m)) {}
 
-void Roads::close(const std::vector<Eigen::Vector2d>& centers_m, double side_m) {
+void Roads::close_for_good(int scan, const std::vector<Eigen::Vector2d>& centers_m, double side_m) {
   if (centers_m.empty()) return;
-  open_ = nav::subtract(open_, squares(centers_m, side_m));
+  closings_.push_back({scan, squares(centers_m, side_m)});
+  open_ = nav::subtract(open_, closings_.back().squares);
+}
+
+void Roads::close(const std::vector<Eigen::Vector2d>& centers_m, double side_m, int scan) {
+  if (centers_m.empty()) return;
+  close_for_good(scan, centers_m, side_m);
+  rebuild();
+}
+
+void Roads::close_anew(const std::map<int, std::vector<Eigen::Vector2d>>& centers_m,
+                       double side_m) {
+  std::erase_if(closings_, [](const Closing& closing) { return closing.scan != kNoScan; });
+  open_ = mapped_;
+  for (const Closing& closing : closings_) open_ = nav::subtract(open_, closing.squares);
+  for (const auto& [scan, shown_m] : centers_m) close_for_good(scan, shown_m, side_m);
   rebuild();
 }
 
@@ -43,7 +58,7 @@ void Roads::close_for_now(const std::vector<Eigen::Vector2d>& centers_m, double 
   std::vector<Eigen::Vector2d> again_m, new_m;
   for (const Eigen::Vector2d& center_m : centers_m)
     (nav::contains(closed_twice_, nav::to_mm(center_m)) ? again_m : new_m).push_back(center_m);
-  if (!again_m.empty()) open_ = nav::subtract(open_, squares(again_m, side_m));
+  close_for_good(kNoScan, again_m, side_m);
   if (!new_m.empty()) closed_for_now_ = nav::unite(closed_for_now_, squares(new_m, side_m));
   if (!centers_m.empty()) rebuild();
 }

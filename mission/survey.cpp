@@ -552,14 +552,15 @@ ScanEffect Survey::insert(const hal::ScanCloud& cloud,
   }
   ScanEffect effect = model_->add(cloud, W_points_m, T_W_S, scan.ground_z_m);
   if (stop.view) scan.resolved_voxels = model_->settle();
-  close_roads(effect.new_obstacles_m);
+  close_roads(scan.number, effect.new_obstacles_m);
   return effect;
 }
 
 // What the scans show and the map lacks closes the robot's roads through it.
-void Survey::close_roads(const std::vector<Eigen::Vector2d>& obstacles_m) {
+void Survey::close_roads(int scan, const std::vector<Eigen::Vector2d>& obstacles_m) {
   if (tasks_.start_area < 0) return;
-  roads_[static_cast<std::size_t>(tasks_.start_area)].close(obstacles_m, SiteModel::kObstacleCellM);
+  roads_[static_cast<std::size_t>(tasks_.start_area)].close(obstacles_m, SiteModel::kObstacleCellM,
+                                                            scan);
 }
 
 void Survey::drop(const Stop& stop, const std::string& reason) {
