@@ -14,8 +14,8 @@ namespace hal {
 
 using boost::system::error_code;
 
-// One waiting coroutine. It lives in the frame of that coroutine's wait(), which its handler keeps
-// alive: whoever finishes it must take the handler out first.
+// One waiting coroutine. It lives in the frame that wait() makes, which its handler keeps alive:
+// whoever finishes it must take the handler out first.
 struct Wake::Waiter {
   enum class End { call, drop };
 
@@ -47,10 +47,11 @@ void Wake::enlist(Waiter& waiter, Handler handler) {
         });
 }
 
+// Not a coroutine of its own: that would be a second frame, and a second throw when cancelled.
 Task<void> Wake::wait() {
-  Waiter waiter;
-  co_await boost::asio::async_initiate<const boost::asio::use_awaitable_t<>&, void(error_code)>(
-      [&](auto handler) { enlist(waiter, std::move(handler)); }, boost::asio::use_awaitable);
+  return boost::asio::async_initiate<const boost::asio::use_awaitable_t<>&, void(error_code)>(
+      [this, waiter = Waiter{}](auto handler) mutable { enlist(waiter, std::move(handler)); },
+      boost::asio::use_awaitable);
 }
 
 void Wake::drop() {

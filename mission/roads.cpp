@@ -1,5 +1,8 @@
 #include "mission/roads.hpp"
 
+#include <algorithm>
+#include <utility>
+
 #include "nav/polygons.hpp"
 
 namespace mission {
@@ -15,6 +18,12 @@ nav::Polygons squares(const std::vector<Eigen::Vector2d>& centers_m, double side
   return nav::normalise(rings);
 }
 
+bool same(const nav::Polygons& a, const nav::Polygons& b) {
+  return std::ranges::equal(a, b, [](const nav::Polygon& p, const nav::Polygon& q) {
+    return p.outer == q.outer && p.holes == q.holes;
+  });
+}
+
 }  // namespace
 
 Roads::Roads(nav::FreeArea area, double robot_radius_m)
@@ -24,9 +33,24 @@ Roads::Roads(nav::FreeArea area, double robot_radius_m)
       robot_radius_m_(robot_radius_m),
       roadmap_(nav::Roadmap::build(area_, robot_radius_m)) {}
 
-void Roads::close(const std::vector<Eigen::Vector2d>& centers_m, double side_m) {
+void Roads::close_for_good(int scan, const std::vector<Eigen::Vector2d>& centers_m, double side_m) {
   if (centers_m.empty()) return;
-  open_ = nav::subtract(open_, squares(centers_m, side_m));
+  closings_.push_back({scan, squares(centers_m, side_m)});
+  open_ = nav::subtract(open_, closings_.back().squares);
+}
+
+void Roads::close(const std::vector<Eigen::Vector2d>& centers_m, double side_m, int scan) {
+  if (centers_m.empty()) return;
+  close_for_good(scan, centers_m, side_m);
+  rebuild();
+}
+
+void Roads::close_anew(const std::map<int, std::vector<Eigen::Vector2d>>& centers_m,
+                       double side_m) {
+  std::erase_if(closings_, [](const Closing& closing) { return closing.scan != kNoScan; });
+  open_ = mapped_;
+  for (const Closing& closing : closings_) open_ = nav::subtract(open_, closing.squares);
+  for (const auto& [scan, shown_m] : centers_m) close_for_good(scan, shown_m, side_m);
   rebuild();
 }
 
@@ -34,7 +58,7 @@ void Roads::close_for_now(const std::vector<Eigen::Vector2d>& centers_m, double 
   std::vector<Eigen::Vector2d> again_m, new_m;
   for (const Eigen::Vector2d& center_m : centers_m)
     (nav::contains(closed_twice_, nav::to_mm(center_m)) ? again_m : new_m).push_back(center_m);
-  if (!again_m.empty()) open_ = nav::subtract(open_, squares(again_m, side_m));
+  close_for_good(kNoScan, again_m, side_m);
   if (!new_m.empty()) closed_for_now_ = nav::unite(closed_for_now_, squares(new_m, side_m));
   if (!centers_m.empty()) rebuild();
 }
@@ -49,7 +73,9 @@ bool Roads::reopen() {
 }
 
 void Roads::rebuild() {
-  area_.drivable = closed_for_now_.empty() ? open_ : nav::subtract(open_, closed_for_now_);
+  nav::Polygons drivable = closed_for_now_.empty() ? open_ : nav::subtract(open_, closed_for_now_);
+  if (same(drivable, area_.drivable)) return;  // Closed, or open, already.
+  area_.drivable = std::move(drivable);
   area_.standable = nav::offset(area_.drivable, -nav::to_mm({robot_radius_m_, 0}).x);
   roadmap_ = nav::Roadmap::build(area_, robot_radius_m_);
 }

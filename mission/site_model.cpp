@@ -130,6 +130,12 @@ planning::VoxelGrid voxel_grid(const MissionConfig& config, const nav::SiteMap& 
   return grid;
 }
 
+std::vector<Eigen::Vector2d> ScanEffect::closed_m() const {
+  std::vector<Eigen::Vector2d> closed = new_obstacles_m;
+  closed.insert(closed.end(), rough_ground_m.begin(), rough_ground_m.end());
+  return closed;
+}
+
 SiteModel::SiteModel(const MissionConfig& config, const nav::SiteMap& map,
                      std::vector<AreaTask> tasks, int threads)
     : SiteModel(config, map, tasks, threads,

@@ -66,6 +66,9 @@ struct ScanEffect {
       new_obstacles_m;  // Centres of 0.25 m cells that the map has as free.
   // Of such cells whose ground is too steep, or a step, for the robot: new ones.
   std::vector<Eigen::Vector2d> rough_ground_m;
+
+  // Both: where no road leads any more.
+  std::vector<Eigen::Vector2d> closed_m() const;
 };
 
 class SiteModel {

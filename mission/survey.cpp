@@ -566,17 +566,14 @@ ScanEffect Survey::insert(const hal::ScanCloud& cloud,
   }
   ScanEffect effect = model_->add(cloud, W_points_m, T_W_S, scan.ground_z_m);
   if (stop.view) scan.resolved_voxels = model_->settle();
-  close_roads(effect);
+  close_roads(scan.number, effect);
   return effect;
 }
 
-// What the scans show and the map lacks closes the robot's roads through it: obstacles, and ground
-// that is too rough.
-void Survey::close_roads(const ScanEffect& effect) {
+void Survey::close_roads(int scan, const ScanEffect& effect) {
   if (tasks_.start_area < 0) return;
-  std::vector<Eigen::Vector2d> closed_m = effect.new_obstacles_m;
-  closed_m.insert(closed_m.end(), effect.rough_ground_m.begin(), effect.rough_ground_m.end());
-  roads_[static_cast<std::size_t>(tasks_.start_area)].close(closed_m, SiteModel::kObstacleCellM);
+  roads_[static_cast<std::size_t>(tasks_.start_area)].close(effect.closed_m(),
+                                                            SiteModel::kObstacleCellM, scan);
 }
 
 void Survey::drop(const Stop& stop, const std::string& reason) {

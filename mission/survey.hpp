@@ -188,7 +188,7 @@ class Survey {
   hal::Task<void> leave(std::string reason, bool stopped_for_gain);
   void note_leftover(bool stopped_for_gain);
   void drop(const Stop& stop, const std::string& reason);
-  void close_roads(const ScanEffect& effect);
+  void close_roads(int scan, const ScanEffect& effect);
   void decide(const boost::json::object& decision);
   void show(const Stop& stop);
   double now_s() const { return before_s_ + hal::seconds(parts_.clock.now() - began_); }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include "mission/json_text.hpp"
@@ -262,12 +263,14 @@ bool Survey::fit_tour() {
   return true;
 }
 
-// The files of the scans, the cloud and the map, as if every scan had come with its pose of now.
+// The files of the scans, the cloud, the map and the roads, as if every scan had come with its pose
+// of now.
 // What views were tried for and given up stays so.
 void Survey::fill_anew(bool save) {
   auto anew = std::make_unique<SiteModel>(config_, map_, tasks_.tasks, threads_);
   anew->take_up(*model_);
   CloudMerger cloud;
+  std::map<int, std::vector<Eigen::Vector2d>> shown_m;  // What the map lacks, by scan.
   for (ScanRecord& scan : record_.scans) {
     const bool refused = scan.fit.verdict == ScanVerdict::refused;
     if (!refused) {
@@ -282,13 +285,16 @@ void Survey::fill_anew(bool save) {
       cloud.add(W_points_m);
       const ScanEffect effect = anew->add(measured, W_points_m, T_W_S, scan.ground_z_m);
       scan.points_outside_box = effect.points_outside_box;
-      close_roads(effect);
+      shown_m[scan.number] = effect.closed_m();
     }
     scan.after = anew->counts();
   }
   model_ = std::move(anew);
   cloud_ = std::move(cloud);
   record_.grid = model_->map().grid();
+  if (tasks_.start_area >= 0)
+    roads_[static_cast<std::size_t>(tasks_.start_area)].close_anew(shown_m,
+                                                                   SiteModel::kObstacleCellM);
 }
 
 void Survey::note_registration() {

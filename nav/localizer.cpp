@@ -80,7 +80,9 @@ std::string_view name(Source source) {
 
 Localizer::Localizer(const LocalizerConfig& config, const hal::Pose2& start,
                      const Eigen::Matrix3d& covariance)
-    : config_(config), oldest_(config, start, covariance), filter_(oldest_) {}
+    : config_(config),
+      final_{Entry{{}, InertialSample{}, LocalizerFilter(config, start, covariance)}},
+      filter_(final_.front().after) {}
 
 void Localizer::predict(const hal::ImuSample& sample) {
   add(InertialSample{sample.stamp, {0, 0, sample.yaw_rate_radps}, {}});
@@ -102,7 +104,8 @@ Correction Localizer::add(const LocalizerEvent& event) {
   // Most come in order: look from the end.
   auto at = history_.end();
   while (at != history_.begin() && after(*std::prev(at))) --at;
-  filter_ = at == history_.begin() ? oldest_ : std::prev(at)->after;
+  const bool latest = at == history_.end();  // The filter is that of the last entry already.
+  if (!latest) filter_ = at == history_.begin() ? final_.front().after : std::prev(at)->after;
   Correction correction;
   const bool gated = event.index() >= 2;
   correction.gate = filter_.apply(config_, event);
@@ -110,8 +113,7 @@ Correction Localizer::add(const LocalizerEvent& event) {
     correction.nis = filter_.last_nis();
     correction.dimension = filter_.last_dimension();
   }
-  at = std::next(history_.insert(at, Entry{stamp, event, filter_}));
-  for (; at != history_.end(); ++at) {
+  for (at = std::next(keep(at, stamp, event)); at != history_.end(); ++at) {
     filter_.apply(config_, at->event);
     at->after = filter_;
   }
@@ -119,19 +121,32 @@ Correction Localizer::add(const LocalizerEvent& event) {
   return correction;
 }
 
+// With the filter as it is now.
+std::list<Localizer::Entry>::iterator Localizer::keep(std::list<Entry>::const_iterator before,
+                                                      hal::Time stamp,
+                                                      const LocalizerEvent& event) {
+  if (spare_.empty()) return history_.insert(before, Entry{stamp, event, filter_});
+  const auto kept = spare_.begin();
+  history_.splice(before, spare_, kept);
+  kept->stamp = stamp;
+  kept->event = event;
+  kept->after = filter_;
+  return kept;
+}
+
 void Localizer::forget(hal::Time now) {
   const hal::Time oldest = now - hal::from_seconds(config_.history_s);
   while (history_.size() > 1 &&
          (history_.front().stamp < oldest || history_.size() > config_.history_max)) {
-    oldest_ = history_.front().after;
     final_until_ = history_.front().stamp;
-    history_.pop_front();
+    spare_.splice(spare_.begin(), final_);
+    final_.splice(final_.begin(), history_, history_.begin());
   }
 }
 
 // Poses stand where travel reports end: between two of them the way is cut in proportion.
 hal::Pose2 Localizer::pose_at(hal::Time stamp) const {
-  const LocalizerFilter* from = &oldest_;
+  const LocalizerFilter* from = &final_.front().after;
   for (const Entry& entry : history_) {
     if (!std::holds_alternative<hal::WheelTravel>(entry.event)) {
       if (entry.stamp <= stamp) from = &entry.after;  // Corrected since.

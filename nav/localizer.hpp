@@ -5,7 +5,7 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <deque>
+#include <list>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -69,12 +69,15 @@ class Localizer {
     LocalizerFilter after;
   };
 
+  std::list<Entry>::iterator keep(std::list<Entry>::const_iterator before, hal::Time stamp,
+                                  const LocalizerEvent& event);
   void forget(hal::Time now);
 
   LocalizerConfig config_;
-  LocalizerFilter oldest_;  // Before the first entry.
+  std::list<Entry> final_;  // One: the filter before the first entry.
   std::optional<hal::Time> final_until_;
-  std::deque<Entry> history_;
+  std::list<Entry> history_;
+  std::list<Entry> spare_;  // Forgotten: entries are large, and come and go all the time.
   LocalizerFilter filter_;  // After the last entry.
 };
 

@@ -98,6 +98,7 @@ double nearest_beside_m(std::span<const Vector2d> obstacles, const Way& way, dou
 
 void ObstacleMap::add(const hal::Profile& profile, const hal::Pose2& W_scanner, hal::Time now) {
   take_out_empty(profile, W_scanner, now);
+  auto latest = cells_.end();  // Beams beside each other often end in one cell.
   for (std::size_t i = 0; i < profile.ranges_m.size(); ++i) {
     const double range_m = profile.ranges_m[i];
     if (!(range_m >= config_.range_min_m && range_m <= config_.reach_m)) continue;
@@ -106,7 +107,8 @@ void ObstacleMap::add(const hal::Profile& profile, const hal::Pose2& W_scanner, 
     const Vector2d point_m = W_scanner.position_m + range_m * towards(angle_rad);
     const std::pair<int, int> place(static_cast<int>(std::floor(point_m.x() / config_.cell_m)),
                                     static_cast<int>(std::floor(point_m.y() / config_.cell_m)));
-    Cell& cell = cells_[place];
+    if (latest == cells_.end() || latest->first != place) latest = cells_.try_emplace(place).first;
+    Cell& cell = latest->second;
     // Of one profile's returns in a cell the nearest: it is the one to be touched first.
     const bool nearer =
         (point_m - W_scanner.position_m).norm() < (cell.W_point_m - W_scanner.position_m).norm();

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cassert>
 #include <map>
-#include <numeric>
 #include <utility>
 
 namespace nav {
@@ -56,6 +55,68 @@ void add_contacts(const std::vector<SegmentMm>& edges, int i, int j, std::vector
   touch(sb, t, s.b);
 }
 
+// Calls visit(k, l), k < l, for each pair of boxes that overlap, once; the boxes are in the order
+// of x0. Looks for them in bands of y: a pair counts in the lowest band that both reach.
+template <class Visit>
+void for_overlapping(const std::vector<Box>& boxes, Visit visit) {
+  constexpr std::size_t kBoxesPerBand = 16, kBandsMax = 256;
+  if (boxes.empty()) return;
+  std::int64_t low = boxes.front().y0, high = boxes.front().y1;
+  for (const Box& box : boxes) low = std::min(low, box.y0), high = std::max(high, box.y1);
+  const std::size_t count = std::clamp<std::size_t>(boxes.size() / kBoxesPerBand, 1, kBandsMax);
+  const std::int64_t height = (high - low) / static_cast<std::int64_t>(count) + 1;
+  const auto band_of = [&](std::int64_t y) { return static_cast<std::size_t>((y - low) / height); };
+  std::vector<std::vector<int>> bands(count);
+  for (std::size_t k = 0; k < boxes.size(); ++k)
+    for (std::size_t band = band_of(boxes[k].y0); band <= band_of(boxes[k].y1); ++band)
+      bands[band].push_back(static_cast<int>(k));
+  for (std::size_t band = 0; band < count; ++band)
+    for (std::size_t m = 0; m < bands[band].size(); ++m) {
+      const Box& mine = boxes[bands[band][m]];
+      for (std::size_t n = m + 1; n < bands[band].size(); ++n) {
+        const Box& other = boxes[bands[band][n]];
+        if (other.x0 > mine.x1) break;
+        if (other.y0 > mine.y1 || other.y1 < mine.y0) continue;
+        if (band_of(std::max(mine.y0, other.y0)) == band) visit(bands[band][m], bands[band][n]);
+      }
+    }
+}
+
+// Contacts of which at least one edge is `of_these`; empty: of any. In the order of the edges'
+// boxes from left to right.
+std::vector<Contact> contacts_of(const std::vector<SegmentMm>& edges,
+                                 const std::vector<bool>& of_these) {
+  std::vector<std::pair<std::int64_t, int>> order;  // x0 of its box, and the edge.
+  order.reserve(edges.size());
+  for (int i = 0; i < static_cast<int>(edges.size()); ++i)
+    if (edges[i].a != edges[i].b) order.emplace_back(std::min(edges[i].a.x, edges[i].b.x), i);
+  std::sort(order.begin(), order.end());
+  std::vector<Box> boxes;
+  boxes.reserve(order.size());
+  for (const auto& [_, i] : order) boxes.push_back(box_of(edges[i]));
+  struct Pair {
+    int k, l;
+    std::size_t first, end;  // Of `found`.
+  };
+  std::vector<Pair> pairs;
+  std::vector<Contact> found;
+  for_overlapping(boxes, [&](int k, int l) {
+    const int i = order[k].second, j = order[l].second;
+    if (!of_these.empty() && !of_these[i] && !of_these[j]) return;
+    const std::size_t first = found.size();
+    add_contacts(edges, i, j, found);
+    if (found.size() > first) pairs.push_back({k, l, first, found.size()});
+  });
+  std::sort(pairs.begin(), pairs.end(),
+            [](const Pair& p, const Pair& q) { return std::pair(p.k, p.l) < std::pair(q.k, q.l); });
+  std::vector<Contact> sorted;
+  sorted.reserve(found.size());
+  for (const Pair& pair : pairs)
+    sorted.insert(sorted.end(), found.begin() + static_cast<std::ptrdiff_t>(pair.first),
+                  found.begin() + static_cast<std::ptrdiff_t>(pair.end));
+  return sorted;
+}
+
 // A directed edge of one of the two ring sets; after merging, of the arrangement of both.
 struct Edge {
   SegmentMm line;
@@ -66,18 +127,23 @@ struct Edge {
 // Cuts every edge at its contacts; false when there was nothing to cut. A cut at a rounded crossing
 // bends the edge by up to 0.71 mm, so it can cause further crossings: repeat until there are none.
 // That ends, because every crossing cuts at least one of its edges into shorter ones.
-bool cut_at_contacts(std::vector<Edge>& edges) {
+//
+// `bent`: the edges whose contacts with any other are not known to be none; empty: all of them.
+bool cut_at_contacts(std::vector<Edge>& edges, std::vector<bool>& bent) {
   std::vector<SegmentMm> lines;
   lines.reserve(edges.size());
   for (const Edge& e : edges) lines.push_back(e.line);
-  const std::vector<Contact> found = contacts(lines);
+  const std::vector<Contact> found = contacts_of(lines, bent);
   if (found.empty()) return false;
   std::vector<std::vector<PointMm>> cuts(edges.size());
+  std::vector<bool> crossed(edges.size());
   for (const Contact& c : found) {
     cuts[c.first].push_back(c.point);
     cuts[c.second].push_back(c.point);
+    if (c.crossing) crossed[c.first] = crossed[c.second] = true;
   }
   std::vector<Edge> pieces;
+  bent.clear();
   for (std::size_t i = 0; i < edges.size(); ++i) {
     const auto [a, b] = edges[i].line;
     std::sort(cuts[i].begin(), cuts[i].end(), [a = a, b = b](PointMm p, PointMm q) {
@@ -86,7 +152,10 @@ bool cut_at_contacts(std::vector<Edge>& edges) {
     cuts[i].push_back(b);
     PointMm from = a;
     for (const PointMm to : cuts[i]) {
-      if (to != from) pieces.push_back({{from, to}, edges[i].net_a, edges[i].net_b});
+      if (to != from) {
+        pieces.push_back({{from, to}, edges[i].net_a, edges[i].net_b});
+        bent.push_back(crossed[i]);
+      }
       from = to;
     }
   }
@@ -298,51 +367,10 @@ void add_edges(const std::vector<Ring>& rings, int net_a, int net_b, std::vector
   }
 }
 
-// Pairs of boxes that overlap, in their order; the boxes are in the order of x0. Looks for them in
-// bands of y: a pair counts in the lowest band that both reach.
-std::vector<std::pair<int, int>> overlapping(const std::vector<Box>& boxes) {
-  constexpr std::size_t kBoxesPerBand = 16, kBandsMax = 256;
-  if (boxes.empty()) return {};
-  std::int64_t low = boxes.front().y0, high = boxes.front().y1;
-  for (const Box& box : boxes) low = std::min(low, box.y0), high = std::max(high, box.y1);
-  const std::size_t count = std::clamp<std::size_t>(boxes.size() / kBoxesPerBand, 1, kBandsMax);
-  const std::int64_t height = (high - low) / static_cast<std::int64_t>(count) + 1;
-  const auto band_of = [&](std::int64_t y) { return static_cast<std::size_t>((y - low) / height); };
-  std::vector<std::vector<int>> bands(count);
-  for (std::size_t k = 0; k < boxes.size(); ++k)
-    for (std::size_t band = band_of(boxes[k].y0); band <= band_of(boxes[k].y1); ++band)
-      bands[band].push_back(static_cast<int>(k));
-  std::vector<std::pair<int, int>> pairs;
-  for (std::size_t band = 0; band < count; ++band)
-    for (std::size_t m = 0; m < bands[band].size(); ++m) {
-      const Box& mine = boxes[bands[band][m]];
-      for (std::size_t n = m + 1; n < bands[band].size(); ++n) {
-        const Box& other = boxes[bands[band][n]];
-        if (other.x0 > mine.x1) break;
-        if (other.y0 > mine.y1 || other.y1 < mine.y0) continue;
-        if (band_of(std::max(mine.y0, other.y0)) == band)
-          pairs.emplace_back(bands[band][m], bands[band][n]);
-      }
-    }
-  std::sort(pairs.begin(), pairs.end());
-  return pairs;
-}
-
 }  // namespace
 
 std::vector<Contact> contacts(const std::vector<SegmentMm>& edges) {
-  std::vector<int> order(edges.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::erase_if(order, [&](int i) { return edges[i].a == edges[i].b; });
-  std::sort(order.begin(), order.end(), [&](int i, int j) {
-    return std::pair(box_of(edges[i]).x0, i) < std::pair(box_of(edges[j]).x0, j);
-  });
-  std::vector<Box> boxes;
-  boxes.reserve(order.size());
-  for (const int i : order) boxes.push_back(box_of(edges[i]));
-  std::vector<Contact> found;
-  for (const auto& [k, l] : overlapping(boxes)) add_contacts(edges, order[k], order[l], found);
-  return found;
+  return contacts_of(edges, {});
 }
 
 std::int64_t twice_area_mm2(const Ring& ring) {
@@ -372,7 +400,8 @@ Polygons overlay(const std::vector<Ring>& a, const std::vector<Ring>& b, Inside 
   std::vector<Edge> edges;
   add_edges(a, 1, 0, edges);
   add_edges(b, 0, 1, edges);
-  while (cut_at_contacts(edges)) {
+  std::vector<bool> bent;
+  while (cut_at_contacts(edges, bent)) {
   }
   std::vector<Ring> rings = Tracer(borders(merged(edges), inside)).rings();
   std::erase_if(rings, is_sliver);

@@ -27,6 +27,11 @@ CastAhead::CastAhead(Config config, World& world, hal::Clock& clock, const PanTr
 void CastAhead::set_arc(const MirrorArc& arc, hal::Duration arc_time) {
   arc_ = arc;
   arc_time_ = arc_time;
+  L_directions_.clear();
+  for (std::uint32_t i = 0; i < arc.beams; ++i) {
+    const double angle_rad = arc.angle_first_rad + i * arc.angle_step_rad;
+    L_directions_.emplace_back(std::cos(angle_rad), std::sin(angle_rad), 0);
+  }
   caster_ = std::make_unique<ProfileCaster>(world_.scene(), config_.ranges, arc, config_.T_P_L,
                                             config_.seed);
   key_.reset();
@@ -59,14 +64,15 @@ std::span<const float> CastAhead::with_people(const MirrorTurn& turn,
                                               std::span<const float> ranges_m) {
   const Eigen::Isometry3d T_W_S = key_->at.T_W_S(world_.config().scanner.height_m);
   among_people_m_.assign(ranges_m.begin(), ranges_m.end());
+  std::optional<double> panned_rad;
+  Eigen::Isometry3d T_W_L;
   for (std::uint32_t i = 0; i < arc_.beams; ++i) {
     const double pan_rad =
         turn.pan_first_rad + (turn.pan_end_rad - turn.pan_first_rad) * i / arc_.beams;
-    const Eigen::Isometry3d T_W_L =
-        T_W_S * Eigen::AngleAxisd(pan_rad, Eigen::Vector3d::UnitZ()) * config_.T_P_L;
-    const double angle_rad = arc_.angle_first_rad + i * arc_.angle_step_rad;
-    const Eigen::Vector3d W_direction =
-        T_W_L.linear() * Eigen::Vector3d(std::cos(angle_rad), std::sin(angle_rad), 0);
+    if (panned_rad != pan_rad)  // Most turns are of a pan axis that stands, or of none.
+      T_W_L = T_W_S * Eigen::AngleAxisd(pan_rad, Eigen::Vector3d::UnitZ()) * config_.T_P_L;
+    panned_rad = pan_rad;
+    const Eigen::Vector3d W_direction = T_W_L.linear() * L_directions_[i];
     const double range_m = world_.range_to_people_m(T_W_L.translation(), W_direction);
     const bool seen =
         range_m >= config_.ranges.range_min_m && range_m <= config_.ranges.range_max_m;

@@ -54,6 +54,7 @@ class CastAhead {
   const TurnStart start_;
   MirrorArc arc_;
   hal::Duration arc_time_{};
+  std::vector<Eigen::Vector3d> L_directions_;  // Of the arc's beams.
   std::unique_ptr<ProfileCaster> caster_;
   std::optional<Key> key_;
   std::vector<MirrorTurn> turns_;

@@ -18,8 +18,16 @@ constexpr hal::Duration kLatency = 1ms;
 constexpr hal::Duration kTransfer = 500us;  // From the end of a scan to its sending.
 enum Kind { kScan = 1 << 20 };              // Of messages, for the fault `stuck`.
 
+void append_with_sum(std::string& text, std::string_view line) {
+  text += line;
+  text += drivers::scip_checksum(line);
+  text += '\n';
+}
+
 std::string with_sum(std::string_view line) {
-  return std::string(line) + drivers::scip_checksum(line) + '\n';
+  std::string text;
+  append_with_sum(text, line);
+  return text;
 }
 
 std::string status(const std::string& command, std::string_view code) {
@@ -224,6 +232,7 @@ hal::Task<void> HokuyoUnit::measure() {
 std::string HokuyoUnit::scan_text(std::uint64_t number) {
   const auto ranges_m = ahead_.of(number, static_cast<std::uint64_t>(stream_.skip + 1));
   std::string data;
+  data.reserve(ranges_m.size() * (stream_.intensities ? 6 : 3));
   for (const float range_m : ranges_m) {
     const double mm = range_m * 1000.0 * faults_.wrong_factor() + 0.5;
     const auto distance = static_cast<std::uint32_t>(mm);
@@ -242,9 +251,11 @@ std::string HokuyoUnit::scan_text(std::uint64_t number) {
   std::string time;
   append_encoded(time, device_ms(turn_start(number)), 4);
   text += with_sum(time);
+  text.reserve(text.size() + data.size() + data.size() / 32 + 3);
   for (std::size_t at = 0; at < data.size(); at += 64)
-    text += with_sum(std::string_view(data).substr(at, 64));
-  return text + '\n';
+    append_with_sum(text, std::string_view(data).substr(at, 64));
+  text += '\n';
+  return text;
 }
 
 }  // namespace sim

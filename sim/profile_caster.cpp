@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "sim/parallel.hpp"
@@ -53,6 +54,9 @@ ProfileCaster::~ProfileCaster() = default;
 
 void ProfileCaster::Impl::Strip::aim(std::uint32_t beam, RTCRayHit16& rays, int* valid) const {
   const auto beams = static_cast<std::uint32_t>(of.P_directions.size());
+  std::optional<double> aimed;  // The pan angle of what follows: mostly that of the ray before.
+  double c{}, s{};
+  Eigen::Vector3f origin;
   for (std::uint32_t i = 0; i < kPacket; ++i) {
     const std::uint32_t turn =
         std::min<std::uint32_t>(i / width(), static_cast<std::uint32_t>(turns.size()) - 1);
@@ -60,13 +64,14 @@ void ProfileCaster::Impl::Strip::aim(std::uint32_t beam, RTCRayHit16& rays, int*
     valid[i] = i / width() < turns.size() && beam + i % width() < beams ? -1 : 0;
     const double pan = turns[turn].pan_first_rad +
                        (turns[turn].pan_end_rad - turns[turn].pan_first_rad) * b / beams;
-    const double c = std::cos(pan), s = std::sin(pan);
     const auto turned = [&](const Eigen::Vector3d& p) {
       return Eigen::Vector3d(c * p.x() - s * p.y(), s * p.x() + c * p.y(), p.z());
     };
+    if (aimed != pan) {
+      aimed = pan, c = std::cos(pan), s = std::sin(pan);
+      origin = (T_W_S * turned(of.P_origin_m) - of.scene.origin_m()).cast<float>();
+    }
     const Eigen::Vector3f direction = (T_W_S.linear() * turned(of.P_directions[b])).cast<float>();
-    const Eigen::Vector3f origin =
-        (T_W_S * turned(of.P_origin_m) - of.scene.origin_m()).cast<float>();
     rays.ray.org_x[i] = origin.x();
     rays.ray.org_y[i] = origin.y();
     rays.ray.org_z[i] = origin.z();

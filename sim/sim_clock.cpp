@@ -14,8 +14,8 @@ namespace sim {
 
 using boost::system::error_code;
 
-// One waiting coroutine. It lives in the frame of that coroutine's sleep_until, which its handler
-// keeps alive: whoever finishes it must take the handler out first.
+// One waiting coroutine. It lives in the frame that sleep_until makes, which its handler keeps
+// alive: whoever finishes it must take the handler out first.
 struct SimClock::Sleeper {
   enum class End { call, drop };
 
@@ -47,10 +47,13 @@ void SimClock::enlist(Sleeper& sleeper, hal::Time wake, Handler handler) {
     });
 }
 
+// Not a coroutine of its own: that would be a second frame, and a second throw when cancelled.
 hal::Task<void> SimClock::sleep_until(hal::Time wake) {
-  Sleeper sleeper;
-  co_await boost::asio::async_initiate<const boost::asio::use_awaitable_t<>&, void(error_code)>(
-      [&](auto handler) { enlist(sleeper, wake, std::move(handler)); }, boost::asio::use_awaitable);
+  return boost::asio::async_initiate<const boost::asio::use_awaitable_t<>&, void(error_code)>(
+      [this, wake, sleeper = Sleeper{}](auto handler) mutable {
+        enlist(sleeper, wake, std::move(handler));
+      },
+      boost::asio::use_awaitable);
 }
 
 SimClock::~SimClock() {

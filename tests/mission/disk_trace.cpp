@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <mutex>
 
 namespace mission_test {
 namespace {
@@ -15,7 +16,44 @@ namespace {
 namespace fs = std::filesystem;
 using Kind = DiskOp::Kind;
 
-DiskTrace* tracing = nullptr;
+thread_local DiskTrace* tracing = nullptr;  // Null: this thread's files are on a sound disk.
+
+int asked(Kind kind) {
+  return tracing == nullptr ? 0 : tracing->asked(kind);
+}
+
+void note(DiskOp op) {
+  if (tracing != nullptr) tracing->note(std::move(op));
+}
+
+int number_of(const fs::path& path, bool created) {
+  return tracing == nullptr ? 0 : tracing->number_of(path, created);
+}
+
+// Hands each thread's calls to the trace that it has.
+class ByThread final : public mission::FileCalls {
+ public:
+  int open(const char* path, int flags, unsigned mode) override {
+    return tracing == nullptr ? FileCalls::open(path, flags, mode)
+                              : tracing->open(path, flags, mode);
+  }
+  std::ptrdiff_t write(int fd, const void* bytes, std::size_t count) override {
+    return tracing == nullptr ? FileCalls::write(fd, bytes, count)
+                              : tracing->write(fd, bytes, count);
+  }
+  int fsync(int fd) override {
+    return tracing == nullptr ? FileCalls::fsync(fd) : tracing->fsync(fd);
+  }
+  int ftruncate(int fd, std::int64_t bytes) override {
+    return tracing == nullptr ? FileCalls::ftruncate(fd, bytes) : tracing->ftruncate(fd, bytes);
+  }
+  int rename(const char* from, const char* to) override {
+    return tracing == nullptr ? FileCalls::rename(from, to) : tracing->rename(from, to);
+  }
+  int unlink(const char* path) override {
+    return tracing == nullptr ? FileCalls::unlink(path) : tracing->unlink(path);
+  }
+};
 
 // --- SQLite's files: its own, with us in between.
 
@@ -38,34 +76,30 @@ int read_file(sqlite3_file* file, void* to, int count, sqlite3_int64 at) {
   return traced(file).real->pMethods->xRead(traced(file).real, to, count, at);
 }
 int write_file(sqlite3_file* file, const void* bytes, int count, sqlite3_int64 at) {
-  const int failure = tracing->asked(Kind::write);
+  const int failure = asked(Kind::write);
   if (failure > 0) return failure == ENOSPC ? SQLITE_FULL : SQLITE_IOERR_WRITE;
-  tracing->note({Kind::write,
-                 tracing->number_of(*traced(file).path, false),
-                 *traced(file).path,
-                 {},
-                 at,
-                 std::string(static_cast<const char*>(bytes), static_cast<std::size_t>(count))});
+  note({Kind::write,
+        number_of(*traced(file).path, false),
+        *traced(file).path,
+        {},
+        at,
+        std::string(static_cast<const char*>(bytes), static_cast<std::size_t>(count))});
   return traced(file).real->pMethods->xWrite(traced(file).real, bytes, count, at);
 }
 int truncate_file(sqlite3_file* file, sqlite3_int64 size) {
-  if (tracing->asked(Kind::truncate) > 0) return SQLITE_IOERR_TRUNCATE;
-  tracing->note({Kind::truncate,
-                 tracing->number_of(*traced(file).path, false),
-                 *traced(file).path,
-                 {},
-                 size,
-                 {}});
+  if (asked(Kind::truncate) > 0) return SQLITE_IOERR_TRUNCATE;
+  note({Kind::truncate, number_of(*traced(file).path, false), *traced(file).path, {}, size, {}});
   return traced(file).real->pMethods->xTruncate(traced(file).real, size);
 }
 // The first flush of a new file flushes its folder too, as SQLite's own layer does.
 int sync_file(sqlite3_file* file, int flags) {
-  if (tracing->asked(Kind::sync) > 0) return SQLITE_IOERR_FSYNC;
-  (void)flags;  // The test's own disk need not be flushed.
+  if (asked(Kind::sync) > 0) return SQLITE_IOERR_FSYNC;
+  if (tracing == nullptr) return traced(file).real->pMethods->xSync(traced(file).real, flags);
+  // The test's own disk need not be flushed.
   const fs::path& path = *traced(file).path;
-  tracing->note({Kind::sync, tracing->number_of(path, false), path, {}, 0, {}});
+  note({Kind::sync, number_of(path, false), path, {}, 0, {}});
   if (!std::exchange(traced(file).folder_synced, true))
-    tracing->note({Kind::sync_folder, 0, path.parent_path(), {}, 0, {}});
+    note({Kind::sync_folder, 0, path.parent_path(), {}, 0, {}});
   return SQLITE_OK;
 }
 int size_of_file(sqlite3_file* file, sqlite3_int64* size) {
@@ -101,7 +135,7 @@ int open_file(sqlite3_vfs*, const char* name, sqlite3_file* file, int flags, int
   TracedFile& mine = traced(file);
   mine.base.pMethods = nullptr;
   if (name == nullptr) return SQLITE_CANTOPEN;  // Temporary ones: we need none.
-  if (tracing->asked(Kind::create) > 0) return SQLITE_CANTOPEN;
+  if (asked(Kind::create) > 0) return SQLITE_CANTOPEN;
   const bool there = fs::exists(name);
   mine.real = reinterpret_cast<sqlite3_file*>(&mine + 1);
   const int done = real_vfs->xOpen(real_vfs, name, mine.real, flags, out);
@@ -109,17 +143,15 @@ int open_file(sqlite3_vfs*, const char* name, sqlite3_file* file, int flags, int
   mine.base.pMethods = &kMethods;
   mine.path = new fs::path(name);
   mine.folder_synced = there;
-  if (!there)
-    tracing->note({Kind::create, tracing->number_of(*mine.path, true), *mine.path, {}, 0, {}});
+  if (!there) note({Kind::create, number_of(*mine.path, true), *mine.path, {}, 0, {}});
   return SQLITE_OK;
 }
 int delete_file(sqlite3_vfs*, const char* name, int sync_folder) {
-  if (tracing->asked(Kind::remove) > 0) return SQLITE_IOERR_DELETE;
+  if (asked(Kind::remove) > 0) return SQLITE_IOERR_DELETE;
   const int done = real_vfs->xDelete(real_vfs, name, sync_folder);
   if (done != SQLITE_OK) return done;
-  tracing->note({Kind::remove, tracing->number_of(name, false), name, {}, 0, {}});
-  if (sync_folder != 0)
-    tracing->note({Kind::sync_folder, 0, fs::path(name).parent_path(), {}, 0, {}});
+  note({Kind::remove, number_of(name, false), name, {}, 0, {}});
+  if (sync_folder != 0) note({Kind::sync_folder, 0, fs::path(name).parent_path(), {}, 0, {}});
   return SQLITE_OK;
 }
 
@@ -140,16 +172,17 @@ sqlite3_vfs& traced_vfs() {
 
 }  // namespace
 
+// Both sides of the seam stay in place: without a trace they only hand on.
 DiskTrace::DiskTrace(Fail fail) : fail_(std::move(fail)) {
+  static std::mutex mutex;
+  static ByThread by_thread;
+  const std::scoped_lock lock(mutex);
+  if (real_vfs == nullptr) sqlite3_vfs_register(&traced_vfs(), 1);
+  if (&mission::file_calls() != &by_thread) mission::set_file_calls(&by_thread);
   tracing = this;
-  sqlite3_vfs_register(&traced_vfs(), 1);
-  mission::set_file_calls(this);
 }
 
 DiskTrace::~DiskTrace() {
-  mission::set_file_calls(nullptr);
-  sqlite3_vfs_unregister(&traced_vfs());
-  sqlite3_vfs_register(real_vfs, 1);
   tracing = nullptr;
 }
 

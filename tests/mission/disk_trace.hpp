@@ -31,7 +31,8 @@ class DiskTrace final : public mission::FileCalls {
   // Asked before each call: an errno makes it fail, and -1 makes a write short.
   using Fail = std::function<int(DiskOp::Kind kind)>;
 
-  // From now on all file calls of the mission, and SQLite's, go through this; one at a time.
+  // From now on all file calls of the mission on this thread, and SQLite's, go through this; one at
+  // a time.
   explicit DiskTrace(Fail fail = {});
   ~DiskTrace() override;
 

@@ -41,6 +41,15 @@ bool hides(const sim::UnitFaults& faults) {
 
 }  // namespace
 
+Judge::Judge(hal::Clock& clock, Rig& rig, mission::GuardedSurvey& survey, bool held)
+    : clock_(clock), rig_(rig), survey_(survey) {
+  if (!held) return;
+  may_move_ = false;
+  stopped_at_ = clock.now() - 1h;
+  released_at_ = crept_at_ = *stopped_at_;
+  driven_ = true;  // Before the cut: creeping needs a release, too.
+}
+
 void Judge::violated(std::string invariant, std::string seen) {
   if (!violation_) violation_ = {clock_.now(), std::move(invariant), std::move(seen)};
 }

@@ -17,9 +17,8 @@ struct Violation {
 
 class Judge {
  public:
-  // All must outlive it.
-  Judge(hal::Clock& clock, Rig& rig, mission::GuardedSurvey& survey)
-      : clock_(clock), rig_(rig), survey_(survey) {}
+  // All must outlive it. `held`: power came back, and nothing moves before a person's release.
+  Judge(hal::Clock& clock, Rig& rig, mission::GuardedSurvey& survey, bool held);
 
   // A frame passes the drive unit's end of the bus.
   void on_frame(const hal::CanFrame& frame, bool to_unit);

@@ -1,5 +1,6 @@
-// vantage-dst: missions of the shipped executive and drivers on simulated devices that fail, one
-// for each seed, in virtual time. Ends with 1 at the first seed that violates what must always
+// vantage-dst: missions of the shipped executive and drivers on simulated devices that fail, and on
+// a computer whose clock is set, whose disk fails and whose power is cut, one for each seed, in
+// virtual time. Ends with 1 at the first seed that violates what must always
 // hold, and says how to see it again.
 #include <fmt/format.h>
 
@@ -28,8 +29,8 @@ void tell(const dst::Outcome& outcome) {
   fmt::print("  {} scans, {:.1f} m, {:.1f} s of virtual time in {:.2f} s of a core; end: {}\n",
              outcome.scans, outcome.driven_m, hal::seconds(outcome.virtual_time), outcome.cpu_s,
              outcome.end);
-  fmt::print("  trace: decisions {:016x}, frames {:016x}\n", outcome.decisions_hash,
-             outcome.frames_hash);
+  fmt::print("  trace: decisions {:016x}, frames {:016x}, journal {:016x}; gone on with {} times\n",
+             outcome.decisions_hash, outcome.frames_hash, outcome.journal_hash, outcome.resumed);
 }
 
 int replay(std::uint64_t seed) {
@@ -48,9 +49,10 @@ int run(const Asked& asked) {
       asked.seed, asked.missions, asked.jobs, [&](std::uint64_t seed, const dst::Outcome& outcome) {
         if (asked.verbose)
           fmt::print(
-              "seed {}: {:.0f} s in {:.2f} s, {} scans, decisions {:016x}, frames {:016x}: {}\n",
+              "seed {}: {:.0f} s in {:.2f} s, {} scans, decisions {:016x}, frames {:016x}, journal "
+              "{:016x}: {}\n",
               seed, hal::seconds(outcome.virtual_time), outcome.cpu_s, outcome.scans,
-              outcome.decisions_hash, outcome.frames_hash, outcome.end);
+              outcome.decisions_hash, outcome.frames_hash, outcome.journal_hash, outcome.end);
         if (outcome.violation) std::fputs(dst::report(seed, *outcome.violation).c_str(), stdout);
         std::fflush(stdout);
       });
@@ -86,7 +88,10 @@ int soak(std::uint64_t seed, double hours) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Missions on devices that fail, in virtual time."};
+  CLI::App app{
+      "Missions on devices that fail, and on a computer whose clock is set, whose disk fails and "
+      "whose power is cut, in virtual time. A run that is cut is gone on with from what its disk "
+      "still has."};
   Asked asked;
   app.add_option("--seed", asked.seed, "of the first mission")->capture_default_str();
   app.add_option("--missions", asked.missions, "how many, with seeds one after the other")

@@ -9,15 +9,20 @@
 #include <fstream>
 #include <functional>
 #include <iterator>
+#include <set>
 #include <sstream>
 
+#include "mission/resume.hpp"
 #include "sim/sim_clock.hpp"
+#include "tests/dst/rig/disk.hpp"
+#include "tests/dst/rig/wall_clock.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace dst {
 namespace {
 
 using namespace std::chrono_literals;
+namespace fs = std::filesystem;
 
 constexpr hal::Duration kPersonLooks = 500ms;
 constexpr hal::Duration kPersonTriesAgain = 20s;
@@ -36,15 +41,49 @@ double cpu_s() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-std::uint64_t hash_of(const std::filesystem::path& file) {
-  std::uint64_t hash = 0xcbf29ce484222325;
-  std::ifstream in(file, std::ios::binary);
-  for (std::istreambuf_iterator<char> at(in), end; at != end; ++at)
-    hash = (hash ^ static_cast<unsigned char>(*at)) * 0x100000001b3;
+// FNV-1a of 64 bits.
+std::uint64_t hashed(std::string_view bytes, std::uint64_t hash = 0xcbf29ce484222325) {
+  for (const char byte : bytes) hash = (hash ^ static_cast<unsigned char>(byte)) * 0x100000001b3;
   return hash;
 }
 
-std::vector<std::string> last_lines(const std::filesystem::path& file) {
+std::uint64_t hash_of(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  return hashed(bytes);
+}
+
+std::uint64_t hash_of(const std::vector<mission::JournalEvent>& events) {
+  std::uint64_t hash = hashed("");
+  for (const mission::JournalEvent& event : events)
+    hash = hashed(fmt::format("{} {} {} {}\n", event.number, event.at.time_since_epoch().count(),
+                              event.kind, event.text),
+                  hash);
+  return hash;
+}
+
+// Of a run that nobody has open. Throws what says why it cannot be read.
+std::vector<mission::JournalEvent> events_in(const fs::path& run) {
+  return mission::JournalFile::open(run / mission::RunStore::kJournalName).value().read().value();
+}
+
+mission::RunHistory history_in(const fs::path& run) {
+  return mission::read_history(events_in(run), run / mission::RunStore::kJournalName).value();
+}
+
+// By their checksums: these very measurements.
+std::vector<std::uint64_t> scans_in(const fs::path& run) {
+  std::vector<std::uint64_t> all;
+  if (!fs::exists(run / mission::RunStore::kJournalName)) return all;
+  for (const mission::ScanDone* scan : history_in(run).scans()) all.push_back(scan->beams_checksum);
+  return all;
+}
+
+bool begins_with(const std::vector<std::uint64_t>& all, const std::vector<std::uint64_t>& first) {
+  return all.size() >= first.size() && std::equal(first.begin(), first.end(), all.begin());
+}
+
+std::vector<std::string> last_lines(const fs::path& file) {
   constexpr std::size_t kLines = 5;
   std::vector<std::string> lines;
   std::ifstream in(file);
@@ -59,20 +98,75 @@ struct Happening {
   std::function<void()> happens;
 };
 
+// A run's folder and what is known of it.
+struct Run {
+  mission::RunStore store;
+  mission::JournalFile journal;
+  std::optional<mission::RunHistory> past;
+};
+
+void write_event(mission::JournalFile& journal, mission::EventText event) {
+  std::vector<mission::JournalEvent> one{{0, {}, std::move(event.kind), std::move(event.text)}};
+  journal.append(one).value();
+}
+
+Run begin_run(const fs::path& folder) {
+  Run run{mission::RunStore::open(folder).value(),
+          mission::JournalFile::open(folder / mission::RunStore::kJournalName).value(),
+          {}};
+  write_event(run.journal, mission::event_of(mission::RunBegun{"random", "dst", {}}));
+  return run;
+}
+
+// As the program does it on a robot.
+Run take_up_run(const fs::path& folder) {
+  mission::RunHistory history = history_in(folder);
+  const std::optional<int> lost = mission::verify_scans(history, folder).value();
+  Run run{mission::RunStore::go_on(folder).value(),
+          mission::JournalFile::open(folder / mission::RunStore::kJournalName).value(),
+          {}};
+  write_event(run.journal, mission::event_of(mission::RunResumed{history.why_ended(), lost}));
+  ++history.resumed;
+  run.past = std::move(history);
+  return run;
+}
+
+// Where the robot stands, and in which folder its run is.
+struct Begin {
+  hal::Pose2 stands;
+  fs::path folder;
+  bool after_cut = false;  // Of the power, or of a run that ended with its disk.
+  bool goes_on = false;
+  fs::path flushed = {}, next = {};  // Where the disk's states after a cut are made.
+};
+
 class Mission {
  public:
-  Mission(const support::RandomYard& yard, const Scenario& scenario, const Options& options)
+  Mission(const support::RandomYard& yard, const Scenario& scenario, const Options& options,
+          const Begin& begin)
       : scenario_(scenario),
         options_(options),
+        begin_(begin),
+        disk_(begin.folder),
+        run_(begin.goes_on ? take_up_run(begin.folder) : begin_run(begin.folder)),
+        journal_(std::move(run_.journal), clock_, compute_),
         prepared_(prepared(yard)),
-        rig_(yard, clock_),
-        survey_(prepared_, 1, {}, {io_, clock_, rig_.drivers(), store_, progress_, compute_}),
-        judge_(clock_, rig_, survey_) {}
+        rig_(yard, clock_, begin.stands),
+        survey_(prepared_, 1, config(begin),
+                {io_, clock_, rig_.drivers(), run_.store, progress_, compute_, &journal_,
+                 run_.past ? &*run_.past : nullptr}),
+        judge_(clock_, rig_, survey_, begin.after_cut) {}
 
   Outcome run();
+  const Disk& disk() const { return disk_; }
+  hal::Pose2 stands() { return rig_.world().robot().pose; }
 
  private:
+  static mission::GuardedSurvey::Config config(const Begin& begin);
   std::vector<Happening> happenings();
+  void add_computer(std::vector<Happening>& all);
+  bool loses_power();
+  void lose_power();
   void add_faults(std::vector<Happening>& all);
   void add_presses(std::vector<Happening>& all);
   hal::Task<void> fate();
@@ -86,11 +180,14 @@ class Mission {
 
   const Scenario& scenario_;
   const Options options_;
+  const Begin begin_;
   boost::asio::io_context io_{1};
   sim::SimClock clock_{io_};
-  hal::ComputeHere compute_;
-  test::TempFolder folder_;
-  mission::RunStore store_ = mission::RunStore::open(folder_.path() / "run").value();
+  WallClock wall_clock_;
+  Disk disk_;
+  ComputeOnDisk compute_{disk_, clock_};
+  Run run_;
+  mission::Journal journal_;
   std::ostringstream told_;
   mission::ProgressPrinter progress_{told_, false};
   mission::Prepared prepared_;
@@ -99,7 +196,15 @@ class Mission {
   Judge judge_;
   Outcome outcome_;
   int releases_ = 0;  // Since the robot stopped.
+  int steps_ = 0;     // Since the time of the power cut.
+  bool cut_ = false;
 };
+
+mission::GuardedSurvey::Config Mission::config(const Begin& begin) {
+  mission::GuardedSurvey::Config config;
+  if (begin.after_cut) config.boot = mission::Boot::power_cut;
+  return config;
+}
 
 void Mission::add_faults(std::vector<Happening>& all) {
   for (const DeviceFault& fault : scenario_.faults) {
@@ -128,11 +233,26 @@ void Mission::add_presses(std::vector<Happening>& all) {
     all.push_back({jump.from, [this, &jump] { rig_.world().shift_date(jump.days); }});
 }
 
+void Mission::add_computer(std::vector<Happening>& all) {
+  for (const ClockJump& jump : scenario_.clock_jumps)
+    all.push_back({jump.from, [this, &jump] { wall_clock_.jump(jump.by); }});
+  if (!scenario_.disk) return;
+  const DiskTrouble& trouble = *scenario_.disk;
+  all.push_back({trouble.from, [this, &trouble] { disk_.set(trouble.fault); }});
+  all.push_back({trouble.from + trouble.during, [this] { disk_.mend(); }});
+}
+
+// Counted in steps, so that it comes in the middle of anything.
+bool Mission::loses_power() {
+  if (!scenario_.power_cut || clock_.now() < hal::Time(scenario_.power_cut->from)) return false;
+  return cut_ = steps_++ >= scenario_.power_cut->steps;
+}
+
 std::vector<Happening> Mission::happenings() {
   std::vector<Happening> all;
   add_faults(all);
   add_presses(all);
-  // Power cuts, resumed missions and faults of the disk belong here as well.
+  add_computer(all);
   std::ranges::stable_sort(all, {}, &Happening::at);
   return all;
 }
@@ -218,13 +338,13 @@ void Mission::run_to_the_end() {
   const hal::Time late(options_.ends_within);
   clock_.run([&] {
     judge_.look();
-    return judge_.violation() || survey_.ended() || clock_.now() > late;
+    return judge_.violation() || survey_.ended() || clock_.now() > late || loses_power();
   });
-  judge_.on_end(survey_.ended());
+  if (!cut_) judge_.on_end(survey_.ended());
 }
 
 Outcome Mission::outcome() {
-  (void)store_.finish();
+  if (!cut_) (void)run_.store.finish();
   const mission::RunRecord& record = survey_.survey().record();
   outcome_.completed = record.completed;
   outcome_.end = record.end.empty() ? survey_.failure() : record.end;
@@ -232,8 +352,8 @@ Outcome Mission::outcome() {
   outcome_.scans = record.scans.size();
   outcome_.virtual_time = clock_.now().time_since_epoch();
   outcome_.driven_m = rig_.world().driven_m();
-  outcome_.decisions_hash = hash_of(folder_.path() / "run" / "decisions.jsonl");
-  outcome_.decisions = last_lines(folder_.path() / "run" / "decisions.jsonl");
+  outcome_.decisions_hash = hash_of(begin_.folder / "decisions.jsonl");
+  outcome_.decisions = last_lines(begin_.folder / "decisions.jsonl");
   outcome_.frames_hash = judge_.frames_hash();
   outcome_.stops = judge_.stops();
   outcome_.slowest_stop = judge_.slowest_stop();
@@ -243,21 +363,121 @@ Outcome Mission::outcome() {
 
 Outcome Mission::run() {
   const double began_s = cpu_s();
+  Outcome result;
   try {
     run_to_the_end();
+    result = outcome();
+    if (cut_) lose_power();
   } catch (const std::exception& error) {
     outcome_.violation = {clock_.now(), "no part of the program ends by itself", error.what()};
+    result = outcome();
   }
-  Outcome result = outcome();
   result.cpu_s = cpu_s() - began_s;
   return result;
+}
+
+// What the disk has now is all that the next start finds. The program then ends in its own way, so
+// that everything that waits in it lets go; nobody sees that any more.
+void Mission::lose_power() {
+  disk_.copy_flushed(begin_.flushed);
+  disk_.copy_cut(scenario_.seed, begin_.next);
+  disk_.mend();
+  survey_.stop("the power was cut");
+  clock_.run([&] { return survey_.ended(); });
+}
+
+// What one leg of a run left.
+struct Left {
+  Outcome outcome;
+  hal::Pose2 stands;
+};
+
+Left run_leg(const support::RandomYard& yard, const Scenario& scenario, const Options& options,
+             const Begin& begin) {
+  Mission mission(yard, scenario, options, begin);
+  const Outcome outcome = mission.run();
+  if (!begin.after_cut && outcome.end.starts_with("F70")) {  // The disk ended it.
+    mission.disk().copy_flushed(begin.flushed);
+    mission.disk().copy(begin.next);
+  }
+  return {outcome, mission.stands()};
+}
+
+void add(Outcome& sum, const Outcome& next) {
+  const Outcome first = std::exchange(sum, next);
+  sum.virtual_time += first.virtual_time;
+  sum.cpu_s += first.cpu_s;
+  sum.driven_m += first.driven_m;
+  sum.stops += first.stops;
+  sum.slowest_stop = std::max(sum.slowest_stop, first.slowest_stop);
+  sum.decisions_hash ^= first.decisions_hash * 3;
+  sum.frames_hash ^= first.frames_hash * 3;
+  sum.journal_hash ^= first.journal_hash * 3;
+  sum.named.insert(first.named.begin(), first.named.end());
+  sum.held |= first.held;
+  sum.resumed = first.resumed + 1;
+}
+
+// What going on must keep; empty: it did.
+std::string lost_or_repeated(const fs::path& run, const std::vector<std::uint64_t>& safe) {
+  std::multiset<std::string> names;
+  std::vector<std::uint64_t> scans;
+  for (const mission::ScanDone* scan : history_in(run).scans()) {
+    scans.push_back(scan->beams_checksum);
+    names.insert(scan->scan.area + "/" + scan->scan.name);
+  }
+  if (!begins_with(scans, safe))
+    return fmt::format("{} scans were safe; of the run's {} not all are those", safe.size(),
+                       scans.size());
+  for (const std::string& name : names)
+    if (names.count(name) > 1) return name + " has two scans";
+  return "";
+}
+
+// A person goes on where power or disk ended it, with devices that are well and a disk that is.
+void go_on(const support::RandomYard& yard, const Scenario& scenario, const Options& options,
+           const fs::path& folder, const Left& left, Outcome& outcome) {
+  const fs::path next = folder / "next", flushed = folder / "flushed";
+  const std::vector<std::uint64_t> safe = scans_in(flushed), there = scans_in(next);
+  if (!begins_with(there, safe)) {
+    outcome.violation = {hal::Time(outcome.virtual_time), "every acknowledged scan is kept",
+                         fmt::format("{} of {} are there", there.size(), safe.size())};
+    return;
+  }
+  Scenario well;
+  well.seed = scenario.seed;
+  well.releases_after = scenario.releases_after;
+  well.by_button = scenario.by_button;
+  const Begin begin{left.stands, there.empty() ? folder / "anew" : next, true, !there.empty()};
+  const Left second = run_leg(yard, well, options, begin);
+  add(outcome, second.outcome);
+  outcome.journal_hash ^= hash_of(events_in(begin.folder));
+  if (const std::string wrong = lost_or_repeated(begin.folder, safe);
+      !wrong.empty() && !outcome.violation)
+    outcome.violation = {hal::Time(outcome.virtual_time),
+                         "every acknowledged scan is kept, and none is taken again", wrong};
 }
 
 }  // namespace
 
 Outcome run_mission(const support::RandomYard& yard, const Scenario& scenario,
                     const Options& options) {
-  return Mission(yard, scenario, options).run();
+  const test::TempFolder folder;
+  const Begin begin{.stands = yard.tasks.start,
+                    .folder = folder.path() / "run",
+                    .flushed = folder.path() / "flushed",
+                    .next = folder.path() / "next"};
+  const Left left = run_leg(yard, scenario, options, begin);
+  Outcome outcome = left.outcome;
+  outcome.journal_hash = hash_of(events_in(begin.folder));
+  if (outcome.violation || !fs::exists(begin.next)) return outcome;
+  try {
+    go_on(yard, scenario, options, folder.path(), left, outcome);
+  } catch (const std::exception& error) {
+    outcome.violation = {hal::Time(outcome.virtual_time), "a run that was cut can be gone on with",
+                         error.what()};
+  }
+  return outcome;
 }
 
 Outcome run_seed(std::uint64_t seed, const Options& options) {

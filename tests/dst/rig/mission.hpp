@@ -23,7 +23,8 @@ struct Outcome {
   hal::Duration virtual_time{};
   double cpu_s{};  // Of one core.
   double driven_m{};
-  std::uint64_t decisions_hash{}, frames_hash{};  // The trace.
+  std::uint64_t decisions_hash{}, frames_hash{}, journal_hash{};  // The trace.
+  int resumed{};  // How often a person went on with the run: after a power cut, a failed disk.
   int stops{};
   hal::Duration slowest_stop{};
   // What the operator could read while it ran, where Options::observe: "imu: silent", "F001-...".
@@ -33,7 +34,8 @@ struct Outcome {
   // Equal for equal traces.
   bool same_trace(const Outcome& other) const {
     return decisions_hash == other.decisions_hash && frames_hash == other.frames_hash &&
-           virtual_time == other.virtual_time && end == other.end;
+           journal_hash == other.journal_hash && virtual_time == other.virtual_time &&
+           end == other.end;
   }
 };
 
@@ -44,6 +46,8 @@ struct Options {
   std::function<void()> each_minute = {};             // Of virtual time. May be empty.
 };
 
+// With its end, where power was cut or the disk failed: then a person goes on with the run, if it
+// has a scan, or begins anew. What the program was told is safe must be there then, whole.
 Outcome run_mission(const support::RandomYard& yard, const Scenario& scenario,
                     const Options& options = {});
 

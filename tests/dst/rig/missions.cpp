@@ -55,6 +55,7 @@ class Line {
 void Sums::add(const Outcome& outcome) {
   ++missions;
   completed += outcome.completed;
+  resumed += outcome.resumed;
   stops += outcome.stops;
   violated += outcome.violation.has_value();
   scans += outcome.scans;
@@ -66,10 +67,11 @@ void Sums::add(const Outcome& outcome) {
 
 std::string Sums::text() const {
   return fmt::format(
-      "{} missions, {} completed, {} scans, {:.1f} km, {} stops, the slowest after {:.1f} ms; "
+      "{} missions, {} completed, {} gone on with, {} scans, {:.1f} km, {} stops, the slowest "
+      "after {:.1f} ms; "
       "{:.1f} h of virtual time in {:.1f} s of a core: {:.0f} times real time; {} violated\n",
-      missions, completed, scans, driven_m / 1000, stops, 1000 * hal::seconds(slowest_stop),
-      virtual_s / 3600, cpu_s, factor(), violated);
+      missions, completed, resumed, scans, driven_m / 1000, stops,
+      1000 * hal::seconds(slowest_stop), virtual_s / 3600, cpu_s, factor(), violated);
 }
 
 Sums run_seeds(std::uint64_t first, int count, int jobs,

@@ -9,7 +9,7 @@ namespace dst {
 
 // In numbers; of all missions that were run.
 struct Sums {
-  int missions{}, completed{}, stops{}, violated{};
+  int missions{}, completed{}, resumed{}, stops{}, violated{};
   std::size_t scans{};
   double virtual_s{}, cpu_s{}, driven_m{};  // Of all threads together.
   hal::Duration slowest_stop{};

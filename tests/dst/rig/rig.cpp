@@ -98,7 +98,7 @@ hal::Task<hal::Result<hal::ReceivedFrame>> WatchedBus::receive() {
   co_return received;
 }
 
-Rig::Rig(const RandomYard& yard, hal::Clock& clock)
+Rig::Rig(const RandomYard& yard, hal::Clock& clock, const hal::Pose2& stands)
     : yard_(yard),
       scene_(yard.mesh),
       world_(scene_, world_config(yard)),
@@ -110,8 +110,7 @@ Rig::Rig(const RandomYard& yard, hal::Clock& clock)
       obstacles_(clock),
       drivers_end_(can_.attach()),
       bus_(can_.attach()) {
-  if (!world_.put_robot(yard.tasks.start, 0))
-    throw std::runtime_error("the robot cannot stand at its start");
+  if (!world_.put_robot(stands, 0)) throw std::runtime_error("the robot cannot stand there");
   connect(clock);
 }
 

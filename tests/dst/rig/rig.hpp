@@ -46,9 +46,8 @@ class WatchedBus final : public hal::CanBus {
 
 class Rig {
  public:
-  // Clock and yard must outlive it. Throws std::runtime_error when the robot cannot stand at its
-  // start.
-  Rig(const support::RandomYard& yard, hal::Clock& clock);
+  // Clock and yard must outlive it. Throws std::runtime_error when the robot cannot stand there.
+  Rig(const support::RandomYard& yard, hal::Clock& clock, const hal::Pose2& stands);
 
   sim::World& world() { return world_; }
   WatchedBus& bus() { return bus_; }

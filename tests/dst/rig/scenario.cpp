@@ -16,6 +16,7 @@ using sim::UnitFault;
 using support::Dice;
 
 constexpr std::uint64_t kScenarioDraw = 0x5eed;  // Another stream than that of the yard.
+constexpr std::uint64_t kComputerDraw = 0xc0de;  // Nor that of the devices.
 constexpr double kWithin_s = 150;                // Most missions last longer.
 constexpr double kLate_max_s = 300;
 constexpr hal::Duration kLongest = std::chrono::minutes(2);
@@ -85,7 +86,27 @@ void draw_presses(Dice& dice, Scenario& scenario) {
   }
 }
 
+// What befalls the computer itself.
+void draw_computer(Dice& dice, Scenario& scenario) {
+  for (int left = dice.below(3); left > 0; --left) {
+    const double share = dice.uniform(-1, 1);  // Seconds to decades, there and back.
+    const double by_s = std::copysign(std::pow(1.8e9, std::abs(share)), share);
+    scenario.clock_jumps.push_back(
+        {draw_time(dice), std::chrono::seconds(static_cast<long>(std::lround(by_s)))});
+  }
+  if (dice.below(6) == 0)
+    scenario.disk =
+        DiskTrouble{static_cast<DiskFault>(dice.below(4)), draw_time(dice), draw_during(dice)};
+  if (dice.below(3) == 0) scenario.power_cut = PowerCut{draw_time(dice), dice.below(200)};
+}
+
 }  // namespace
+
+std::string_view name(DiskFault fault) {
+  static constexpr std::string_view kNames[]{"is full", "fails", "writes in parts",
+                                             "flushes slowly"};
+  return kNames[static_cast<std::size_t>(fault)];
+}
 
 std::string_view name(Press press) {
   static constexpr std::string_view kNames[]{"base e-stop", "board e-stop", "safety e-stop",
@@ -100,6 +121,9 @@ Scenario draw_scenario(std::uint64_t seed) {
                     .cuts = {},
                     .presses = {},
                     .jumps = {},
+                    .clock_jumps = {},
+                    .disk = {},
+                    .power_cut = {},
                     .releases_after = hal::from_seconds(dice.uniform(1, 60)),
                     .by_button = dice.below(2) == 0};
   if (dice.below(4) == 0) draw_arrivals(dice, scenario);
@@ -121,6 +145,8 @@ Scenario draw_scenario(std::uint64_t seed) {
   if (dice.below(3) == 0)
     scenario.jumps.push_back(
         {draw_time(dice), dice.below(2) == 0 ? kDaysOf56Years : -kDaysOf56Years});
+  Dice computer(seed ^ kComputerDraw << 32);
+  draw_computer(computer, scenario);
   return scenario;
 }
 
@@ -141,6 +167,14 @@ std::string text(const Scenario& scenario) {
   for (const DateJump& jump : scenario.jumps)
     lines.emplace(jump.from, fmt::format("  {:8.3f} s  the satellites' date jumps by {} days\n",
                                          hal::seconds(jump.from), jump.days));
+  for (const ClockJump& jump : scenario.clock_jumps)
+    lines.emplace(jump.from, fmt::format("  {:8.3f} s  the computer's clock jumps by {} s\n",
+                                         hal::seconds(jump.from), jump.by.count()));
+  if (const auto& disk = scenario.disk)
+    add(disk->from, disk->during, "the disk " + std::string(name(disk->fault)));
+  if (const auto& cut = scenario.power_cut)
+    lines.emplace(cut->from, fmt::format("  {:8.3f} s  and {} steps: the power is cut\n",
+                                         hal::seconds(cut->from), cut->steps));
   std::string all =
       fmt::format("  a person releases the robot after {:.1f} s by {}\n",
                   hal::seconds(scenario.releases_after), scenario.by_button ? "button" : "console");

@@ -1,7 +1,9 @@
 // What goes wrong in one mission, drawn from a seed: nothing else decides it.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -44,12 +46,35 @@ struct DateJump {
   int days{};
 };
 
+// People and time servers set the computer's own clock.
+struct ClockJump {
+  hal::Duration from{};
+  std::chrono::seconds by{};
+};
+
+enum class DiskFault : std::uint8_t { full, io_error, short_writes, slow_flushes };
+std::string_view name(DiskFault fault);
+struct DiskTrouble {
+  DiskFault fault{};
+  hal::Duration from{}, during{};
+};
+
+// The computer loses its power, so many steps of the simulation after that time; it comes back, and
+// a person goes on with the run.
+struct PowerCut {
+  hal::Duration from{};
+  int steps{};
+};
+
 struct Scenario {
   std::uint64_t seed{};
   std::vector<DeviceFault> faults;
   std::vector<LinkCut> cuts;
   std::vector<Pressed> presses;
   std::vector<DateJump> jumps;
+  std::vector<ClockJump> clock_jumps;
+  std::optional<DiskTrouble> disk;
+  std::optional<PowerCut> power_cut;
   hal::Duration releases_after{};  // A person releases a robot that has been stopped for so long,
   bool by_button{};                // by the board's button, or as the console does.
 };
