@@ -10,12 +10,12 @@
 namespace planning {
 namespace {
 
-constexpr std::size_t kCandidatesPerPiece = 16;  // Of work for a thread.
+constexpr std::size_t kPlacesPerPiece = 16;  // Of work for a thread.
 
-class Search {
+class ReplacementSearch {
  public:
-  Search(const LostStation& lost, const std::vector<Wall>& walls, const SensorLimits& limits,
-         int threads)
+  ReplacementSearch(const LostStation& lost, const std::vector<Wall>& walls,
+                    const SensorLimits& limits, int threads)
       : lost_(lost), kept_(walls.size()), missing_(walls.size()) {
     for (const auto& sees : lost.kept) kept_.add(spans_of(sees));
     SpanSet seen(walls.size());
@@ -47,7 +47,7 @@ class Search {
  private:
   void look(const Visibility& visibility, int threads) {
     views_.resize(lost_.candidates.size());
-    for_pieces(threads, views_.size(), kCandidatesPerPiece,
+    for_pieces(threads, views_.size(), kPlacesPerPiece,
                [&](int, std::size_t begin, std::size_t end) {
                  for (std::size_t i = begin; i < end; ++i)
                    views_[i] = spans_of(visibility.from(lost_.candidates[i]));
@@ -81,7 +81,7 @@ class Search {
 
 Replacements replace_station(const LostStation& lost, const std::vector<Wall>& walls,
                              const SensorLimits& limits, int threads) {
-  return Search(lost, walls, limits, threads).run();
+  return ReplacementSearch(lost, walls, limits, threads).run();
 }
 
 }  // namespace planning

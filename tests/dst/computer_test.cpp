@@ -1,0 +1,78 @@
+// What befalls the computer in the middle of a mission: its clock is set, its disk fails, its power
+// is cut. Devices are well.
+#include <gmock/gmock.h>
+
+#include "tests/dst/rig/mission.hpp"
+
+namespace {
+
+using namespace std::chrono_literals;
+
+dst::Scenario quiet() {
+  dst::Scenario scenario;
+  scenario.releases_after = 5s;
+  return scenario;
+}
+
+dst::Outcome run(const dst::Scenario& scenario) {
+  dst::Outcome outcome = dst::run_mission(dst::make_quiet_yard(), scenario);
+  EXPECT_FALSE(outcome.violation) << dst::report(0, *outcome.violation);
+  return outcome;
+}
+
+TEST(Computer, GoesOnAsBeforeHoweverItsClockIsSet) {
+  dst::Scenario scenario = quiet();
+  const dst::Outcome before = run(scenario);
+  scenario.clock_jumps = {{10s, std::chrono::years(-56)}, {20s, 1h}, {30s, -2h}, {40s, 1s}};
+  const dst::Outcome set = run(scenario);
+  EXPECT_TRUE(set.completed) << set.end;
+  EXPECT_TRUE(set.same_trace(before));
+}
+
+TEST(Computer, WritesTheSameToADiskThatTakesItInParts) {
+  dst::Scenario scenario = quiet();
+  const dst::Outcome before = run(scenario);
+  scenario.disk = dst::DiskTrouble{dst::DiskFault::short_writes, 1s, dst::kForEver};
+  EXPECT_TRUE(run(scenario).same_trace(before));
+}
+
+TEST(Computer, WaitsForADiskThatFlushesSlowly) {
+  dst::Scenario scenario = quiet();
+  const dst::Outcome before = run(scenario);
+  scenario.disk = dst::DiskTrouble{dst::DiskFault::slow_flushes, 1s, dst::kForEver};
+  const dst::Outcome slow = run(scenario);
+  EXPECT_TRUE(slow.completed) << slow.end;
+  EXPECT_EQ(slow.scans, before.scans);
+  EXPECT_EQ(slow.resumed, 0);
+  EXPECT_GT(slow.virtual_time, before.virtual_time + 1s);
+}
+
+TEST(Computer, EndsByNameWhenItsDiskFailsAndGoesOnWhenItIsMended) {
+  const dst::Outcome before = run(quiet());
+  for (const dst::DiskFault fault : {dst::DiskFault::full, dst::DiskFault::io_error})
+    for (const hal::Duration from : {hal::Duration(20s), before.virtual_time / 2}) {
+      SCOPED_TRACE(testing::Message() << dst::name(fault) << " after " << hal::seconds(from));
+      dst::Scenario scenario = quiet();
+      scenario.disk = dst::DiskTrouble{fault, from, dst::kForEver};
+      const dst::Outcome outcome = run(scenario);
+      EXPECT_EQ(outcome.resumed, 1);
+      EXPECT_TRUE(outcome.completed) << outcome.end;
+      EXPECT_EQ(outcome.scans, before.scans);
+    }
+}
+
+TEST(Computer, KeepsEveryScanWhenItsPowerIsCutAnywhere) {
+  const dst::Outcome before = run(quiet());
+  for (int i = 1; i <= 8; ++i) {
+    SCOPED_TRACE(testing::Message() << "cut after " << i << " ninths");
+    dst::Scenario scenario = quiet();
+    scenario.seed = static_cast<std::uint64_t>(i);
+    scenario.power_cut = dst::PowerCut{i * before.virtual_time / 9, 17 * i};
+    const dst::Outcome outcome = run(scenario);
+    EXPECT_EQ(outcome.resumed, 1);
+    EXPECT_TRUE(outcome.completed) << outcome.end;
+    EXPECT_EQ(outcome.scans, before.scans);
+  }
+}
+
+}  // namespace
