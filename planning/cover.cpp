@@ -136,7 +136,8 @@ std::string in_words(const GreedyCover& cover, const CoverPlan& plan, const Cove
              percent(config.coverage_goal, 1) + ").";
     case CoverEnd::gain:
       return "The best further view would add " + gain(cover.next_gain_nm) +
-             " of the target walls, less than " + least_gain(config) + "; covered is " + share + ".";
+             " of the target walls, less than " + least_gain(config) + "; covered is " + share +
+             ".";
     case CoverEnd::overlap:
       return "Further views would add up to " + gain(cover.next_gain_refused_nm) +
              " of the target walls, but overlap the others by less than overlap_min (" +

@@ -55,7 +55,7 @@ struct CoverConfig {
   double gain_min = 0.02;       // Stop when the next view adds less than this share of the target
   // and less than this: 2 % is the paper's for a courtyard, but half a street on a campus.
   double gain_enough_m = std::numeric_limits<double>::infinity();
-  double overlap_min = 0.2;     // Share of what a station sees that must be seen already.
+  double overlap_min = 0.2;  // Share of what a station sees that must be seen already.
   // These stations, in this order, and no others. They count as candidates too, after those drawn,
   // so that what is coverable stays what some place to stand can see.
   std::optional<std::vector<Candidate>> given = std::nullopt;
@@ -88,10 +88,10 @@ std::vector<Candidate> draw_candidates(const nav::FreeArea& area, int count, dou
 // Algorithm 1: draws candidates, works out what each can image, and picks stations one by one,
 // always the one that adds the most (ties: the lowest index), among those of whose view a share of
 // overlap_min is covered already (the first station excepted). Stops at the coverage goal, when the
-// next view adds less than gain_min and gain_enough_m, when only candidates without enough overlap would add
-// anything, or when all that can be covered is. Refined by default: see CoverMethod. Independent of
-// `threads`. Lengths are sums of whole nanometres, so that they do not depend on the order of
-// summation; view ends that differ by rounding only are one place (join_ends).
+// next view adds less than gain_min and gain_enough_m, when only candidates without enough overlap
+// would add anything, or when all that can be covered is. Refined by default: see CoverMethod.
+// Independent of `threads`. Lengths are sums of whole nanometres, so that they do not depend on the
+// order of summation; view ends that differ by rounding only are one place (join_ends).
 CoverPlan plan_cover(const nav::FreeArea& area, const std::vector<Wall>& walls,
                      const SensorLimits& limits, const CoverConfig& config, std::uint64_t seed,
                      int threads);
