@@ -6,6 +6,7 @@
 #include <fstream>
 #include <set>
 
+#include "tests/mission/box_model.hpp"
 #include "tests/mission/killed_run.hpp"
 #include "tests/mission/mission_site.hpp"
 
@@ -28,10 +29,9 @@ class BlockedYard {
             "coordinates":[[[16,3],[22,3],[22,7],[16,7],[16,3]]]}},
           {"type":"Feature","properties":{"role":"start","heading_deg":0},
             "geometry":{"type":"Point","coordinates":[3,3]}}]})");
-    model_ = "v -40 -40 0\nv 80 -40 0\nv 80 50 0\nv -40 50 0\nf 1 2 3\nf 1 3 4\n";
-    add_box(16, 3, 22, 7, 5);
-    add_box(30, -0.5, 30.3, barrier_to_m, 2);
-    write("model.obj", model_);
+    model_.add(16, 3, 22, 7, 5);
+    model_.add(30, -0.5, 30.3, barrier_to_m, 2);
+    write("model.obj", model_.text());
     write("plan.toml",
           "[[station]]\narea = \"site\"\nname = \"west\"\nx_m = 6\ny_m = 5\n"
           "[[station]]\narea = \"site\"\nname = \"north\"\nx_m = 19\ny_m = 9\n"
@@ -60,38 +60,17 @@ class BlockedYard {
   void write(const std::string& name, const std::string& text) const {
     std::ofstream(site_.folder() / name) << text;
   }
-  void add_box(double x0, double y0, double x1, double y1, double z) {
-    const double xs[] = {x0, x1, x1, x0}, ys[] = {y0, y0, y1, y1};
-    for (const double height : {0.0, z})
-      for (int i = 0; i < 4; ++i)
-        model_ += "v " + std::to_string(xs[i]) + " " + std::to_string(ys[i]) + " " +
-                  std::to_string(height) + "\n";
-    for (int i = 0; i < 4; ++i) {
-      const int a = corner_ + i, b = corner_ + (i + 1) % 4;
-      for (const auto& face : {std::array{a, b, b + 4}, std::array{a, b + 4, a + 4}})
-        model_ += "f " + std::to_string(face[0]) + " " + std::to_string(face[1]) + " " +
-                  std::to_string(face[2]) + "\n";
-    }
-    corner_ += 8;
-  }
 
   mission_test::SmallSite site_;
-  std::string model_;
-  int corner_ = 5;
+  mission_test::BoxModel model_;
 };
-
-std::multiset<std::string> scanned(const mission::RunRecord& record) {
-  std::multiset<std::string> all;
-  for (const mission::ScanRecord& scan : record.scans) all.insert(scan.name);
-  return all;
-}
 
 TEST(ReplacedStation, IsScannedFromBeforeTheBarrier) {
   const BlockedYard yard;
   const mission::RunOutcome outcome = yard.run();
   const mission::RunRecord& record = outcome.record;
   ASSERT_TRUE(record.completed) << record.end;
-  EXPECT_EQ(scanned(record), (std::multiset<std::string>{"west", "north", "east a"}));
+  EXPECT_EQ(mission_test::scanned(record), (std::multiset<std::string>{"west", "north", "east a"}));
   ASSERT_EQ(record.dropped.size(), 1U);
   EXPECT_EQ(record.dropped[0].name, "east");
   ASSERT_TRUE(record.dropped[0].instead);
@@ -115,7 +94,8 @@ TEST(ReplacedStation, IsScannedFromBeforeTheBarrier) {
 TEST(ReplacedStation, IsNotLookedForWhereTheRoadIsOpen) {
   const BlockedYard yard(7);
   const mission::RunOutcome outcome = yard.run();
-  EXPECT_EQ(scanned(outcome.record), (std::multiset<std::string>{"west", "north", "east"}));
+  EXPECT_EQ(mission_test::scanned(outcome.record),
+            (std::multiset<std::string>{"west", "north", "east"}));
   EXPECT_THAT(yard.text("decisions.jsonl"), testing::Not(HasSubstr("replace")));
 }
 
@@ -126,7 +106,8 @@ TEST(ReplacedStation, IsStillToBeScannedAfterACut) {
   const mission::RunOutcome outcome = yard.run(true);
   ASSERT_TRUE(outcome.record.completed) << outcome.record.end;
   EXPECT_EQ(outcome.record.resumed, 1);
-  EXPECT_EQ(scanned(outcome.record), (std::multiset<std::string>{"west", "north", "east a"}));
+  EXPECT_EQ(mission_test::scanned(outcome.record),
+            (std::multiset<std::string>{"west", "north", "east a"}));
   ASSERT_EQ(outcome.record.dropped.size(), 1U);
   ASSERT_TRUE(outcome.record.dropped[0].instead);
   EXPECT_EQ(outcome.record.dropped[0].instead->stations, std::vector<std::string>{"east a"});

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <set>
 
+#include "tests/mission/box_model.hpp"
 #include "tests/mission/mission_site.hpp"
 
 namespace terrain_mission_tests {
@@ -28,10 +29,9 @@ class KerbYard {
             "coordinates":[[[24,3],[27,3],[27,5],[24,5],[24,3]]]}},
           {"type":"Feature","properties":{"role":"start","heading_deg":0},
             "geometry":{"type":"Point","coordinates":[3,4]}}]})");
-    model_ = "v -40 -40 0\nv 80 -40 0\nv 80 50 0\nv -40 50 0\nf 1 2 3\nf 1 3 4\n";
-    add_box(24, 3, 27, 5, 5);
-    add_box(kKerbAtM, -1, 31, to_m, kKerbM);
-    write("model.obj", model_);
+    model_.add(24, 3, 27, 5, 5);
+    model_.add(kKerbAtM, -1, 31, to_m, kKerbM);
+    write("model.obj", model_.text());
     write("plan.toml",
           "[[station]]\narea = \"site\"\nname = \"near\"\nx_m = 12\ny_m = 4\n"
           "[[station]]\narea = \"site\"\nname = \"far\"\nx_m = 28.7\ny_m = 7\n");
@@ -46,41 +46,15 @@ class KerbYard {
   void write(const std::string& name, const std::string& text) const {
     std::ofstream(site_.folder() / name) << text;
   }
-  // With a top.
-  void add_box(double x0, double y0, double x1, double y1, double z) {
-    const double xs[] = {x0, x1, x1, x0}, ys[] = {y0, y0, y1, y1};
-    for (const double height : {0.0, z})
-      for (int i = 0; i < 4; ++i)
-        model_ += "v " + std::to_string(xs[i]) + " " + std::to_string(ys[i]) + " " +
-                  std::to_string(height) + "\n";
-    const auto face = [&](int a, int b, int c) {
-      model_ += "f " + std::to_string(corner_ + a) + " " + std::to_string(corner_ + b) + " " +
-                std::to_string(corner_ + c) + "\n";
-    };
-    for (int i = 0; i < 4; ++i) {
-      face(i, (i + 1) % 4, (i + 1) % 4 + 4);
-      face(i, (i + 1) % 4 + 4, i + 4);
-    }
-    face(4, 5, 6);
-    face(4, 6, 7);
-    corner_ += 8;
-  }
 
   mission_test::SmallSite site_;
-  std::string model_;
-  int corner_ = 5;
+  mission_test::BoxModel model_;
 };
-
-std::set<std::string> scanned(const mission::RunRecord& record) {
-  std::set<std::string> all;
-  for (const mission::ScanRecord& scan : record.scans) all.insert(scan.name);
-  return all;
-}
 
 TEST(Kerb, ThatIsTooHighIsNotCrossed) {
   const mission::RunRecord record = KerbYard(9).run();
   ASSERT_TRUE(record.completed) << record.end;
-  EXPECT_EQ(scanned(record).count("far"), 0U);
+  EXPECT_EQ(mission_test::scanned(record).count("far"), 0U);
   ASSERT_GE(record.dropped.size(), 1U);
   EXPECT_EQ(record.dropped[0].name, "far");
   EXPECT_THAT(record.notes, testing::Contains(HasSubstr("the robot keeps off it")));
@@ -90,14 +64,14 @@ TEST(Kerb, ThatIsTooHighIsNotCrossed) {
 
 TEST(Kerb, ThatTheRobotCanClimbIsNone) {
   const mission::RunRecord record = KerbYard(9, "step_max_m = 0.2\n").run();
-  EXPECT_EQ(scanned(record), (std::set<std::string>{"near", "far"}));
+  EXPECT_EQ(mission_test::scanned(record), (std::multiset<std::string>{"near", "far"}));
   EXPECT_TRUE(record.dropped.empty());
   EXPECT_THAT(record.notes, testing::Not(testing::Contains(HasSubstr("keeps off it"))));
 }
 
 TEST(Kerb, WithAnEndIsGoneRound) {
   const mission::RunRecord record = KerbYard(5).run();
-  EXPECT_EQ(scanned(record), (std::set<std::string>{"near", "far"}));
+  EXPECT_EQ(mission_test::scanned(record), (std::multiset<std::string>{"near", "far"}));
   EXPECT_TRUE(record.dropped.empty());
   int beside = 0;
   for (const auto& leg_m : record.driven_m)
