@@ -15,7 +15,9 @@ using boost::asio::experimental::awaitable_operators::operator||;
 using boost::asio::experimental::awaitable_operators::operator&&;
 namespace fault = stream_fault;
 
-constexpr hal::Duration kProbe = 500ms;  // MON-VER takes a quarter of a second at 9600 baud.
+constexpr hal::Duration kProbe = 500ms;    // MON-VER takes a quarter of a second at 9600 baud.
+constexpr hal::Duration kListen = 1200ms;  // At least, before silence is named: another receiver
+                                           // speaks once a second.
 constexpr hal::Duration kAck = 1s;
 constexpr int kTries = 3;
 constexpr hal::Duration kPause = 500ms;
@@ -76,21 +78,33 @@ hal::Task<bool> Ublox::find() {
     for (const int baud : kUbloxBauds)
       if (baud != baud_) bauds.push_back(baud);
   reader_.forget();
-  for (const int baud : bauds) {
-    if (set_baud_ && !set_baud_(baud)) continue;
-    const Bytes question = encode_ubx(0x0A, 0x04);
-    const auto sent = co_await send(question);
-    if (!sent) {
-      output_.troubles().set(fault::kGone, sent.error().message());
-      co_return false;
+  const hal::Time listened = clock_.now() + kListen;
+  do {
+    for (const int baud : bauds) {
+      const Found found = co_await find_at(baud);
+      if (found != Found::nothing) co_return found == Found::ours;
     }
-    const bool said = co_await ask_version(clock_.now() + kProbe);
-    if (!said) continue;
-    baud_ = baud;
-    co_return model_.has_value();
-  }
+  } while (clock_.now() < listened);
   if (!output_.troubles().has(fault::kGone)) name_silence();
   co_return false;
+}
+
+hal::Task<Ublox::Found> Ublox::find_at(int baud) {
+  if (set_baud_ && !set_baud_(baud)) {
+    co_await clock_.sleep_for(kProbe);
+    co_return Found::nothing;
+  }
+  const Bytes question = encode_ubx(0x0A, 0x04);
+  const auto sent = co_await send(question);
+  if (!sent) {
+    output_.troubles().set(fault::kGone, sent.error().message());
+    co_return Found::other;
+  }
+  const bool said = co_await ask_version(clock_.now() + kProbe);
+  if (output_.troubles().has(fault::kGone)) co_return Found::other;
+  if (!said) co_return Found::nothing;
+  baud_ = baud;
+  co_return model_ ? Found::ours : Found::other;
 }
 
 // Whether it said who it is; then model_ is set if it is one that this driver can use.

@@ -43,7 +43,9 @@ class Ublox final : public hal::Gnss, public Device {
 
  private:
   hal::Task<void> serve();
+  enum class Found : std::uint8_t { nothing, other, ours };
   hal::Task<bool> find();
+  hal::Task<Found> find_at(int baud);
   hal::Task<bool> configure(bool found);
   hal::Task<bool> apply(const UbloxStep& step);
   hal::Task<bool> ask_version(hal::Time deadline);

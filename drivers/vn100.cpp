@@ -13,8 +13,10 @@ using namespace std::chrono_literals;
 using boost::asio::experimental::awaitable_operators::operator||;
 namespace fault = stream_fault;
 
-constexpr hal::Duration kProbe = 200ms;   // For an answer at the right rate.
-constexpr hal::Duration kAnswer = 300ms;  // While it streams, answers queue behind packets.
+constexpr hal::Duration kProbe = 200ms;    // For an answer at the right rate.
+constexpr hal::Duration kListen = 1200ms;  // At least, before silence is named: a receiver speaks
+                                           // once a second.
+constexpr hal::Duration kAnswer = 300ms;   // While it streams, answers queue behind packets.
 constexpr int kTries = 3;
 constexpr hal::Duration kPause = 500ms;   // Between two starts.
 constexpr hal::Duration kGiveUp = 1s;     // Without a new sample: it may have been reset.
@@ -68,24 +70,34 @@ hal::Task<bool> Vn100::find() {
   if (set_baud_)
     for (const int baud : kVn100Bauds)
       if (baud != baud_) bauds.push_back(baud);
-  const Vn100Step who = ask_model();
   reader_.forget();
-  for (const int baud : bauds) {
-    if (set_baud_ && !set_baud_(baud)) continue;
-    const auto answer = co_await ask(who, kProbe);
-    if (answer && identify(who, *answer)) {
-      baud_ = baud;
-      clear_search();
-      co_return true;
+  const hal::Time listened = clock_.now() + kListen;
+  do {
+    for (const int baud : bauds) {
+      const Found found = co_await find_at(baud);
+      if (found != Found::nothing) co_return found == Found::ours;
     }
-    if (answer) co_return false;  // It answers: another model.
-    if (answer.error() != boost::system::errc::timed_out) {
-      troubles_.set(fault::kGone, answer.error().message());
-      co_return false;
-    }
-  }
+  } while (clock_.now() < listened);
   name_silence();
   co_return false;
+}
+
+hal::Task<Vn100::Found> Vn100::find_at(int baud) {
+  if (set_baud_ && !set_baud_(baud)) {
+    co_await clock_.sleep_for(kProbe);
+    co_return Found::nothing;
+  }
+  const Vn100Step who = ask_model();
+  const auto answer = co_await ask(who, kProbe);
+  if (answer && identify(who, *answer)) {
+    baud_ = baud;
+    clear_search();
+    co_return Found::ours;
+  }
+  if (answer) co_return Found::other;  // It answers: another model.
+  if (answer.error() == boost::system::errc::timed_out) co_return Found::nothing;
+  troubles_.set(fault::kGone, answer.error().message());
+  co_return Found::other;
 }
 
 void Vn100::clear_search() {

@@ -41,7 +41,9 @@ class Vn100 final : public hal::Imu, public Device {
 
  private:
   hal::Task<void> serve();
+  enum class Found : std::uint8_t { nothing, other, ours };
   hal::Task<bool> find();
+  hal::Task<Found> find_at(int baud);
   hal::Task<bool> configure();
   hal::Task<bool> apply(const Vn100Step& step);
   hal::Task<hal::Result<Vn100Line>> ask(const Vn100Step& step, hal::Duration patience);
