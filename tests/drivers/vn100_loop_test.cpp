@@ -186,6 +186,30 @@ TEST(Vn100Loop, SaysThatNobodyIsThere) {
   EXPECT_THAT(names(imu.driver), IsEmpty());
 }
 
+// A receiver on the port speaks once a second, at whatever moment: never is it called silence.
+TEST(Vn100Loop, NamesADeviceThatSpeaksOnceASecond) {
+  for (int phase_ms = 0; phase_ms < 1000; phase_ms += 50) {
+    drivers_test::StreamLoop loop{sim::StreamWire::Config()};
+    drivers::Vn100 driver({}, loop.clock, loop.wire.a());
+    const auto speak = [](Imu::StreamLoop& on, int after_ms) -> hal::Task<void> {
+      const std::string_view said = "$GNRMC,,V,,,,,,,,,,N*4D\r\n";
+      const drivers::Bytes sentence(said.begin(), said.end());
+      co_await on.clock.sleep_for(std::chrono::milliseconds(after_ms));
+      for (;;) {
+        (void)co_await on.wire.b().write(sentence);
+        co_await on.clock.sleep_for(std::chrono::seconds(1));
+      }
+    };
+    loop.spawn(speak(loop, phase_ms));
+    loop.spawn(driver.run());
+    loop.run_for(2.5);
+    for (int i = 0; i < 50; ++i) {
+      loop.run_for(0.1);
+      EXPECT_THAT(names(driver), testing::ElementsAre("another device")) << phase_ms;
+    }
+  }
+}
+
 TEST(Vn100Loop, SaysWhichSettingWasRefused) {
   Imu imu;
   // It refuses once: the setting is repeated, and taken.
