@@ -2,11 +2,11 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
 #include <iostream>
 
+#include "mission/main_command_line.hpp"
 #include "mission/main_hardware.hpp"
 #include "mission/main_service.hpp"
 #include "mission/resume.hpp"
@@ -166,46 +166,43 @@ int run(const Options& options) {
   return outcome.stopped ? kStopped : kFailed;
 }
 
+void add_options(mission::CommandLine& line, Options& options) {
+  line.add("mission", &options.mission, "Mission file (TOML)", {.required = true});
+  line.add("--out", &options.out, "Folder for the run's products", {.required = true});
+  line.add("--site", &options.site, "Use this site folder instead of the mission's");
+  line.add("--seed", &options.seed, "Use this seed instead of the mission's");
+  line.add("--threads", &options.threads, "Threads for planning and ray casting (0: all cores)",
+           {.within = {{0, 256}}});
+  line.add("--judge-cells", &options.judge_cells,
+           "Simulation: write the scanner positions that coverage was judged from (CSV)");
+  line.add("--resume", &options.resume,
+           "Go on with the unfinished run in --out: no station is scanned again");
+  line.add("--restart", &options.restart, "Remove an unfinished run in --out and begin anew",
+           {.excludes = "--resume"});
+  line.add("--skip", &options.skip,
+           "With --resume: leave out this station, by its name; may be given again",
+           {.needs = "--resume"});
+  line.add("--quiet", &options.quiet, "No progress on the terminal");
+  line.add("--service", &options.service,
+           "As a service of systemd (see vantage.service): tells it how far it is, and waits "
+           "for a person's release unless the mission says start = \"on-boot\" and the last "
+           "run ended in order; --out holds a numbered folder for each run");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   Options options;
-  CLI::App app{"Surveys a site: plans stations, tours them, takes next best views."};
-  app.footer(
+  mission::CommandLine line(
+      "Surveys a site: plans stations, tours them, takes next best views.",
       "Examples:\n"
       "  vantaged configs/missions/fort.toml --out runs/fort\n"
       "  vantaged configs/missions/any_site.toml --site path/to/folder --out runs/mine\n"
       "Exit: 0 done, 1 the mission failed (the report says how far it came), 2 refused to start,\n"
       "3 stopped by SIGINT or SIGTERM: the robot stands, and the report says how far it came,\n"
       "4 an unfinished run is in the folder: nothing was done; --resume or --restart decides.");
-  app.add_option("mission", options.mission, "Mission file (TOML)")->required();
-  app.add_option("--out", options.out, "Folder for the run's products")->required();
-  app.add_option("--site", options.site, "Use this site folder instead of the mission's");
-  app.add_option("--seed", options.seed, "Use this seed instead of the mission's");
-  app.add_option("--threads", options.threads,
-                 "Threads for planning and ray casting (0: all cores)")
-      ->check(CLI::Range(0, 256));
-  app.add_option("--judge-cells", options.judge_cells,
-                 "Simulation: write the scanner positions that coverage was judged from (CSV)");
-  auto* resume =
-      app.add_flag("--resume", options.resume,
-                   "Go on with the unfinished run in --out: no station is scanned again");
-  app.add_flag("--restart", options.restart, "Remove an unfinished run in --out and begin anew")
-      ->excludes(resume);
-  app.add_option("--skip", options.skip,
-                 "With --resume: leave out this station, by its name; may be given again")
-      ->needs(resume)
-      ->allow_extra_args(false);
-  app.add_flag("--quiet", options.quiet, "No progress on the terminal");
-  app.add_flag("--service", options.service,
-               "As a service of systemd (see vantage.service): tells it how far it is, and waits "
-               "for a person's release unless the mission says start = \"on-boot\" and the last "
-               "run ended in order; --out holds a numbered folder for each run");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kDone : kRefused;
-  }
+  add_options(line, options);
+  if (!line.parse(argc, argv)) return line.asked_for_help() ? kDone : kRefused;
   try {
     return run(options);
   } catch (const std::exception& error) {

@@ -25,7 +25,7 @@ using boost::system::error_code;
 using drivers::kUseTuple;
 
 constexpr std::uint32_t kBaud = 115200;
-constexpr hal::Duration kTryAgain = std::chrono::seconds(5);
+constexpr hal::Duration kPlaceAgain = std::chrono::seconds(5);
 constexpr hal::Duration kAcceptPause = std::chrono::seconds(1);
 constexpr mode_t kMask = 0117;  // Leaves 0660.
 
@@ -131,7 +131,7 @@ hal::Task<void> open(stream_protocol::acceptor& acceptor, const std::string& pat
                       "written, and that no other program serves it",
                       path, error.message()));
     told = error.message();
-    co_await clock.sleep_for(kTryAgain);
+    co_await clock.sleep_for(kPlaceAgain);
   }
 }
 

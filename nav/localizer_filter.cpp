@@ -31,6 +31,18 @@ double gate_of(const LocalizerConfig& config, int numbers) {
   return numbers == 1 ? config.gate1_chi2 : numbers == 2 ? config.gate_chi2 : config.gate3_chi2;
 }
 
+// Products of these sizes are the plain sums anyway: lazyProduct says so at once, where operator*
+// makes the compiler weigh every way there is (three quarters of this file's time).
+
+using UpTo3 = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1>;
+using UpTo3x3 = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3>;
+
+UpTo3x3 inverse(const UpTo3x3& S) {
+  Eigen::Matrix3d full = Eigen::Matrix3d::Identity();
+  full.topLeftCorner(S.rows(), S.cols()) = S;
+  return full.inverse().topLeftCorner(S.rows(), S.cols());
+}
+
 }  // namespace
 
 LocalizerFilter::LocalizerFilter(const LocalizerConfig& config, const hal::Pose2& start,
@@ -126,7 +138,7 @@ void LocalizerFilter::learn_bias(const Turn& turn) {
     const double total = column[kBias + axis] + variance;
     if (total <= 0) continue;
     correct(column * ((turn.angle_rad[axis] / turn.span_s - bias_radps_[axis]) / total));
-    covariance_ -= column * column.transpose() / total;
+    covariance_ -= column.lazyProduct((column / total).transpose());
   }
 }
 
@@ -153,8 +165,8 @@ void LocalizerFilter::move(const LocalizerConfig& config, const hal::WheelTravel
   if (knows_tilt_) turn_by(0, kBias) = turn_by(1, kBias + 1) = -turn.span_s;
   turn_by(2, kSlipLeft) = by_wheels * travel.left_m / config.track_m;
   turn_by(2, kSlipRight) = -by_wheels * travel.right_m / config.track_m;
-  const Rows<3> W_turn_by = R_mid * turn_by;
-  Rows<3> step_by = swings * W_turn_by / 2;
+  const Rows<3> W_turn_by = R_mid.lazyProduct(turn_by);
+  Rows<3> step_by = (swings / 2).lazyProduct(W_turn_by);
   step_by.middleCols<3>(kTheta) += swings;
   step_by.col(kSlipLeft) -= travel.left_m / 2 * R_mid.col(0);
   step_by.col(kSlipRight) -= travel.right_m / 2 * R_mid.col(0);
@@ -163,11 +175,11 @@ void LocalizerFilter::move(const LocalizerConfig& config, const hal::WheelTravel
   R_W_B_ = Eigen::Quaterniond(R_W_B_ * rotation_of(turned)).normalized().toRotationMatrix();
   // F is the identity but for these six rows.
   Matrix FP = covariance_;
-  FP.middleRows<3>(kP) += step_by * covariance_;
-  FP.middleRows<3>(kTheta) += W_turn_by * covariance_;
+  FP.middleRows<3>(kP) += step_by.lazyProduct(covariance_);
+  FP.middleRows<3>(kTheta) += W_turn_by.lazyProduct(covariance_);
   covariance_ = FP;
-  covariance_.middleCols<3>(kP) += FP * step_by.transpose();
-  covariance_.middleCols<3>(kTheta) += FP * W_turn_by.transpose();
+  covariance_.middleCols<3>(kP) += FP.lazyProduct(step_by.transpose());
+  covariance_.middleCols<3>(kTheta) += FP.lazyProduct(W_turn_by.transpose());
 
   covariance_(kHeading, kHeading) +=
       turn.variance + std::pow(config.wheel_turn_error * wheel_turn_rad, 2);
@@ -231,7 +243,7 @@ void LocalizerFilter::level(const LocalizerConfig& config, const Turn& turn, dou
   const double variance =
       std::pow(config.accel_tilt_sigma_rad, 2) * std::max(1.0, config.accel_wander_s / span_s) +
       std::pow(0.1 * accel_mps2 / kGravity_mps2, 2);
-  absorb<2>(H, innovation, variance * Eigen::Matrix2d::Identity());
+  absorb({H.transpose(), innovation, variance * Eigen::Matrix2d::Identity()});
 }
 
 // The wandering error forgets itself: an Ornstein-Uhlenbeck process of unit variance.
@@ -272,7 +284,7 @@ Gate LocalizerFilter::take(const LocalizerConfig& config, const GnssPosition& fi
   const Eigen::Vector2d innovation = fix.position_m - (position_m_ + W_arm).head<2>() -
                                      wanders.cwiseProduct(wander_) - ahead_m(fix.stamp);
 
-  Gate gate = update<2>(config, Source::gnss_position, fix.stamp, H, innovation, white);
+  Gate gate = update(config, Source::gnss_position, fix.stamp, {H.transpose(), innovation, white});
   if (gate == Gate::accepted) {
     agreeing_.reset();
     return gate;
@@ -283,7 +295,7 @@ Gate LocalizerFilter::take(const LocalizerConfig& config, const GnssPosition& fi
   covariance_.topLeftCorner<2, 2>() += off_m2 * Eigen::Matrix2d::Identity();
   // It went astray over the way of the streak: so may have its heading.
   covariance_(kHeading, kHeading) += std::min(off_m2 / std::pow(config.lost_after_m, 2), 1.0);
-  absorb<2>(H, innovation, white);
+  absorb({H.transpose(), innovation, white});
   agreeing_.reset();
   note(Source::gnss_position, fix.stamp, false);
   return Gate::reset;
@@ -316,9 +328,9 @@ Gate LocalizerFilter::take(const LocalizerConfig& config, const GnssVelocity& fi
   H.col(kSlipLeft) = -side_speed_mps_[0] / 2 * R_W_B_.col(0).head<2>();
   H.col(kSlipRight) = -side_speed_mps_[1] / 2 * R_W_B_.col(0).head<2>();
   const double variance = std::pow(fix.sigma_mps, 2) + std::pow(config.gnss_velocity_floor_mps, 2);
-  return update<2>(config, Source::gnss_velocity, fix.stamp, H,
-                   fix.velocity_mps - (W_speed + W_swing).head<2>(),
-                   variance * Eigen::Matrix2d::Identity());
+  return update(config, Source::gnss_velocity, fix.stamp,
+                {H.transpose(), fix.velocity_mps - (W_speed + W_swing).head<2>(),
+                 variance * Eigen::Matrix2d::Identity()});
 }
 
 Gate LocalizerFilter::take(const LocalizerConfig& config, const PoseFix& fix) {
@@ -330,7 +342,8 @@ Gate LocalizerFilter::take(const LocalizerConfig& config, const PoseFix& fix) {
   Eigen::Vector3d innovation;
   innovation << fix.pose.position_m - position_m_.head<2>() - ahead_m(fix.stamp),
       hal::wrapped(fix.pose.heading_rad - heading_of(R_W_B_));
-  const Gate gate = update<3>(config, Source::pose_fix, fix.stamp, H, innovation, fix.covariance);
+  const Gate gate =
+      update(config, Source::pose_fix, fix.stamp, {H.transpose(), innovation, fix.covariance});
   if (gate == Gate::accepted) {
     move_ = {};
     return gate;
@@ -339,7 +352,7 @@ Gate LocalizerFilter::take(const LocalizerConfig& config, const PoseFix& fix) {
   covariance_.topLeftCorner<2, 2>() +=
       innovation.head<2>().squaredNorm() * Eigen::Matrix2d::Identity();
   covariance_(kHeading, kHeading) += innovation[2] * innovation[2];
-  absorb<3>(H, innovation, fix.covariance);
+  absorb({H.transpose(), innovation, fix.covariance});
   move_ = {};
   note(Source::pose_fix, fix.stamp, false);
   return Gate::reset;
@@ -373,8 +386,8 @@ Gate LocalizerFilter::take(const LocalizerConfig& config, const LandmarkSighting
       sighting.range_m - range_m,
       hal::wrapped(sighting.bearing_rad - std::atan2(way.y(), way.x()) + heading_of(R_W_B_)));
   const Eigen::Vector2d sigmas(sighting.range_sigma_m, sighting.bearing_sigma_rad);
-  return update<2>(config, Source::landmark, sighting.stamp, H, innovation,
-                   sigmas.cwiseAbs2().asDiagonal());
+  return update(config, Source::landmark, sighting.stamp,
+                {H.transpose(), innovation, sigmas.cwiseAbs2().asDiagonal()});
 }
 
 Gate LocalizerFilter::take(const LocalizerConfig& config, const BeaconRange& range) {
@@ -384,37 +397,35 @@ Gate LocalizerFilter::take(const LocalizerConfig& config, const BeaconRange& ran
   const double range_m = std::max(way.norm(), 0.01);
   Rows<1> H = Rows<1>::Zero();
   H.middleCols<2>(kP) = way.transpose() / range_m;
-  return update<1>(config, Source::beacon, range.stamp, H,
-                   Eigen::Matrix<double, 1, 1>(range.range_m - range_m),
-                   Eigen::Matrix<double, 1, 1>(range.sigma_m * range.sigma_m));
+  return update(config, Source::beacon, range.stamp,
+                {H.transpose(), Eigen::Matrix<double, 1, 1>(range.range_m - range_m),
+                 Eigen::Matrix<double, 1, 1>(range.sigma_m * range.sigma_m)});
 }
 
-template <int N>
 Gate LocalizerFilter::update(const LocalizerConfig& config, Source source, hal::Time stamp,
-                             const Rows<N>& H, const Eigen::Matrix<double, N, 1>& innovation,
-                             const Eigen::Matrix<double, N, N>& R) {
-  const Eigen::Matrix<double, N, N> S = H * covariance_ * H.transpose() + R;
-  last_nis_ = innovation.dot(S.inverse() * innovation);
-  last_dimension_ = N;
-  const bool refused = !(last_nis_ <= gate_of(config, N));
+                             const Measured& m) {
+  const UpTo3x3 S = m.Ht.transpose().lazyProduct(Tall(covariance_.lazyProduct(m.Ht))) + m.R;
+  last_nis_ = m.innovation.dot(UpTo3(inverse(S).lazyProduct(m.innovation)));
+  last_dimension_ = static_cast<int>(m.innovation.size());
+  const bool refused = !(last_nis_ <= gate_of(config, last_dimension_));
   note(source, stamp, refused);
   if (refused) return Gate::rejected;
-  absorb<N>(H, innovation, R);
+  absorb(m);
   return Gate::accepted;
 }
 
 // Joseph's form: stays symmetric and positive.
-template <int N>
-void LocalizerFilter::absorb(const Rows<N>& H, const Eigen::Matrix<double, N, 1>& innovation,
-                             const Eigen::Matrix<double, N, N>& R) {
-  const Eigen::Matrix<double, kSize, N> PHt = covariance_ * H.transpose();
-  const Eigen::Matrix<double, N, N> S = H * PHt + R;
-  const Eigen::Matrix<double, kSize, N> K = PHt * S.inverse();
-  correct(K * innovation);
+void LocalizerFilter::absorb(const Measured& m) {
+  const Tall PHt = covariance_.lazyProduct(m.Ht);
+  const UpTo3x3 S = m.Ht.transpose().lazyProduct(PHt) + m.R;
+  const Tall K = PHt.lazyProduct(inverse(S));
+  correct(K.lazyProduct(m.innovation));
   // (I - K H) P (I - K H)' + K R K', with the products that are small.
-  const Matrix A = covariance_ - K * PHt.transpose();
-  covariance_ = A - (A * H.transpose()) * K.transpose() + K * R * K.transpose();
-  covariance_ = ((covariance_ + covariance_.transpose()) / 2).eval();
+  Matrix A = covariance_;
+  A -= K.lazyProduct(PHt.transpose());
+  const Tall B = K.lazyProduct(m.R) - Tall(A.lazyProduct(m.Ht));
+  A += B.lazyProduct(K.transpose());
+  covariance_ = (A + A.transpose()) / 2;
 }
 
 // Moves the error into the state.

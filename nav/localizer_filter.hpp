@@ -165,12 +165,15 @@ class LocalizerFilter {
   bool lost(const LocalizerConfig& config, const PoseFix& fix);
   Eigen::Vector2d ahead_m(hal::Time stamp) const;
   void correct(const State& error);
-  template <int N>
-  Gate update(const LocalizerConfig& config, Source source, hal::Time stamp, const Rows<N>& H,
-              const Eigen::Matrix<double, N, 1>& innovation, const Eigen::Matrix<double, N, N>& R);
-  template <int N>
-  void absorb(const Rows<N>& H, const Eigen::Matrix<double, N, 1>& innovation,
-              const Eigen::Matrix<double, N, N>& R);
+  using Tall = Eigen::Matrix<double, kSize, Eigen::Dynamic, 0, kSize, 3>;
+  // One to three numbers, how they depend on the state (transposed), and their covariance.
+  struct Measured {
+    Tall Ht;
+    Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1> innovation;
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3> R;
+  };
+  Gate update(const LocalizerConfig& config, Source source, hal::Time stamp, const Measured& m);
+  void absorb(const Measured& m);
   void note(Source source, hal::Time stamp, bool refused);
 
   Eigen::Vector3d position_m_{0, 0, 0};

@@ -2,13 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
 #include <unordered_set>
+
+#include "nav/linear.hpp"
 
 namespace nav {
 namespace {
@@ -143,10 +144,10 @@ void WallMap::find_normals(const WallMapConfig& config) {
         }
       }
     if (count < 4) continue;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(
-        Eigen::Matrix2d(products / count - sum * sum.transpose() / (count * count)));
-    const Eigen::Array2d length = eigen.eigenvalues().array().max(0).sqrt();
-    if (length[0] < 0.4 * length[1]) wall.normal = eigen.eigenvectors().col(0);
+    const Axes<2> axes =
+        axes_of(Eigen::Matrix2d(products / count - sum * sum.transpose() / (count * count)));
+    const Eigen::Array2d length = axes.values.array().max(0).sqrt();
+    if (length[0] < 0.4 * length[1]) wall.normal = axes.vectors.col(0);
   }
 }
 
@@ -211,16 +212,16 @@ Equations equations_of(const std::vector<Row>& rows, double radius_m,
 }
 
 Eigen::Matrix3d covariance_of(const Equations& e, const ScanMatchConfig& config, bool& free) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(e.H);
+  const Axes<3> axes = axes_of(e.H);
   const double information = e.weight / config.correlated_beams / (e.sigma_m * e.sigma_m);
   Eigen::Matrix3d scaled = Eigen::Matrix3d::Zero();
   const double free_m = std::max(config.free_sigma_m, config.free_sigma_rad * e.radius_m);
   free = false;
   for (int i = 0; i < 3; ++i) {
-    const bool held = eigen.eigenvalues()[i] >= config.free_below;
+    const bool held = axes.values[i] >= config.free_below;
     free = free || !held;
-    const double variance = held ? 1 / (information * eigen.eigenvalues()[i]) : free_m * free_m;
-    scaled += variance * eigen.eigenvectors().col(i) * eigen.eigenvectors().col(i).transpose();
+    const double variance = held ? 1 / (information * axes.values[i]) : free_m * free_m;
+    scaled += variance * axes.vectors.col(i) * axes.vectors.col(i).transpose();
   }
   const Eigen::Vector3d unscale(1, 1, 1 / e.radius_m);
   Eigen::Matrix3d covariance = unscale.asDiagonal() * scaled * unscale.asDiagonal();
@@ -267,12 +268,11 @@ ScanMatch match_from(const WallMap& map, std::span<const Eigen::Vector2d> B_poin
       break;
     }
     e = equations_of(rows, radius_m, config);
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(e.H);
+    const Axes<3> axes = axes_of(e.H);
     Eigen::Vector3d motion = Eigen::Vector3d::Zero();
     for (int i = 0; i < 3; ++i)
-      if (eigen.eigenvalues()[i] >= config.free_below)
-        motion -= eigen.eigenvectors().col(i) *
-                  (eigen.eigenvectors().col(i).dot(e.g) / eigen.eigenvalues()[i]);
+      if (axes.values[i] >= config.free_below)
+        motion -= axes.vectors.col(i) * (axes.vectors.col(i).dot(e.g) / axes.values[i]);
     match.pose.position_m += motion.head<2>();
     match.pose.heading_rad =
         std::remainder(match.pose.heading_rad + motion[2] / radius_m, 2 * std::numbers::pi);

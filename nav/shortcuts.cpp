@@ -11,7 +11,7 @@ using Points = std::vector<Eigen::Vector2d>;
 constexpr int kPassesMax = 8;
 constexpr double kStepMinM = 0.25;
 constexpr double kPointsMax = 2000;
-constexpr double kRoundingM = 1e-9;
+constexpr double kShortcutRoundingM = 1e-9;
 
 // The same line with a point at least every step_m.
 Points resample(const Points& points_m, double step_m) {
@@ -65,7 +65,7 @@ class Pass {
     const auto begin = pieces_m_.begin();
     const double keep_m = *std::min_element(begin + static_cast<std::ptrdiff_t>(from),
                                             begin + static_cast<std::ptrdiff_t>(to));
-    return clearance_of_({points_m_[from], points_m_[to]}, keep_m) >= keep_m - kRoundingM;
+    return clearance_of_({points_m_[from], points_m_[to]}, keep_m) >= keep_m - kShortcutRoundingM;
   }
 
   const Points& points_m_;

@@ -30,6 +30,6 @@ vantage_together(vantage_sim sim
   "nmea_unit")
 vantage_together(vantage_backends mission
   "main_gate main_hardware main_links main_robot main_scanner main_sim main_units main_worker"
-  "main_corrections main_run main_watch")
+  "main_corrections main_run main_watch main_realtime main_service main_serving main_console main_console_places")
 vantage_together(make_sites tools
   "make_sites make_sites_courtyard make_sites_model make_sites_shapes make_sites_site")

@@ -2,7 +2,6 @@
 // terminals, TCP ports and a CAN interface, so that any program can talk to them.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/posix/stream_descriptor.hpp>
@@ -18,6 +17,7 @@
 #include "drivers/real_clock.hpp"
 #include "drivers/socketcan.hpp"
 #include "hal/together.hpp"
+#include "mission/main_command_line.hpp"
 #include "mission/main_corrections.hpp"
 #include "mission/main_run.hpp"
 #include "mission/main_scanner.hpp"
@@ -226,26 +226,21 @@ int run(const Options& options) {
 
 int main(int argc, char** argv) {
   Options options;
-  CLI::App app{"Runs a robot's simulated units in real time, for any program to talk to."};
-  app.footer(
+  mission::CommandLine line(
+      "Runs a robot's simulated units in real time, for any program to talk to.",
       "Prints where each unit is found, as tables of a robot file. On standard input it takes\n"
       "\"ROLE FAULT\" lines: \"scanner garbage\", \"drive off\", \"imu slow:3\", \"pan none\".\n"
       "Example:\n"
       "  vantage-units configs/missions/courtyard.toml --folder /tmp/units --can vcan0\n"
       "Exit: 0 ended by a signal, 1 failed, 2 refused to start.");
-  app.add_option("mission", options.mission, "Mission file (TOML): its site is the world")
-      ->required();
-  app.add_option("--robot", options.robot, "Use this robot file instead of the mission's");
-  app.add_option("--site", options.site, "Use this site folder instead of the mission's");
-  app.add_option("--folder", options.folder, "Where the serial ports are made");
-  app.add_option("--can", options.can, "CAN interface for the drive; none: no drive");
-  app.add_option("--threads", options.threads, "For ray casting (0: all cores)")
-      ->check(CLI::Range(0, 256));
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kDone : kRefused;
-  }
+  line.add("mission", &options.mission, "Mission file (TOML): its site is the world",
+           {.required = true});
+  line.add("--robot", &options.robot, "Use this robot file instead of the mission's");
+  line.add("--site", &options.site, "Use this site folder instead of the mission's");
+  line.add("--folder", &options.folder, "Where the serial ports are made");
+  line.add("--can", &options.can, "CAN interface for the drive; none: no drive");
+  line.add("--threads", &options.threads, "For ray casting (0: all cores)", {.within = {{0, 256}}});
+  if (!line.parse(argc, argv)) return line.asked_for_help() ? kDone : kRefused;
   try {
     return run(options);
   } catch (const std::exception& error) {

@@ -1,8 +1,9 @@
 #include "nav/registration/icp.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+
+#include "nav/linear.hpp"
 
 namespace nav {
 namespace {
@@ -119,13 +120,13 @@ PlaneEquations plane_equations(const std::vector<PlanePair>& pairs,
 }
 
 Vector6d plane_step(const PlaneEquations& equations, double free_below, Eigen::Isometry3d& pose) {
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(equations.H);
+  const Axes<6> axes = axes_of(equations.H);
   Vector6d step = Vector6d::Zero();
   for (int i = 0; i < 6; ++i) {
     // Strengths are in thirds: see HeldAxis.
-    if (3 * eigen.eigenvalues()[i] < free_below) continue;
-    const Vector6d direction = eigen.eigenvectors().col(i);
-    step -= direction * (direction.dot(equations.g) / eigen.eigenvalues()[i]);
+    if (3 * axes.values[i] < free_below) continue;
+    const Vector6d direction = axes.vectors.col(i);
+    step -= direction * (direction.dot(equations.g) / axes.values[i]);
   }
   step.tail<3>() /= equations.radius_m;
   const Eigen::Vector3d arm = pose.translation() - equations.centre_m;

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "nav/linear.hpp"
+
 namespace nav {
 namespace {
 
@@ -81,7 +83,7 @@ Matrix6d covariance_of(const std::vector<MarkPair>& marks, const Eigen::Isometry
     J << Eigen::Matrix3d::Identity(), -cross_matrix(pose.linear() * mark.reading_m);
     H += J.transpose() * J;
   }
-  return sigma_m * sigma_m * H.inverse();
+  return sigma_m * sigma_m * inverse_of(H);
 }
 
 MarkError too_few(const std::vector<MarkPair>& marks, const Consensus& best,

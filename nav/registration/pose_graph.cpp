@@ -2,12 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <Eigen/SparseCholesky>
 #include <cmath>
 #include <numeric>
 #include <stdexcept>
+
+#include "nav/linear.hpp"
 
 namespace nav {
 namespace {
@@ -77,8 +78,9 @@ class Solver {
  public:
   Solver(const PoseGraph& graph, const PoseGraphConfig& config)
       : graph_(graph), config_(config), column_(unknowns(graph, count_)) {
-    for (const auto& link : graph.links) link_information_.push_back(link.covariance.inverse());
-    for (const auto& prior : graph.priors) prior_information_.push_back(prior.covariance.inverse());
+    for (const auto& link : graph.links) link_information_.push_back(inverse_of(link.covariance));
+    for (const auto& prior : graph.priors)
+      prior_information_.push_back(inverse_of(prior.covariance));
   }
 
   PoseGraphFit run() {
@@ -207,7 +209,7 @@ class Solver {
 
 bool positive(const Matrix6d& covariance) {
   return covariance.allFinite() && covariance.isApprox(covariance.transpose(), 1e-9) &&
-         Eigen::LLT<Matrix6d>(covariance).info() == Eigen::Success;
+         axes_of(covariance).values[0] > 0;
 }
 
 std::string problem_with(const PoseGraph& graph) {

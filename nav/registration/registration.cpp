@@ -2,13 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <optional>
 
+#include "nav/linear.hpp"
 #include "nav/registration/icp.hpp"
 
 namespace nav {
@@ -68,15 +68,15 @@ Eigen::Matrix3d held(const Matrix6d& H, bool shift) {
 
 std::array<HeldAxis, 3> axes(const Matrix6d& H, bool shift, const Matrix6d& covariance,
                              double free_below) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(held(H, shift));
+  const Axes<3> found = axes_of(held(H, shift));
   std::array<HeldAxis, 3> all;
   for (int i = 0; i < 3; ++i) {
     HeldAxis& axis = all[static_cast<std::size_t>(i)];
-    axis.direction = eigen.eigenvectors().col(i);
+    axis.direction = found.vectors.col(i);
     Eigen::Index largest = 0;
     axis.direction.cwiseAbs().maxCoeff(&largest);
     if (axis.direction[largest] < 0) axis.direction *= -1;
-    axis.strength = std::max(0.0, 3 * eigen.eigenvalues()[i]);
+    axis.strength = std::max(0.0, 3 * found.values[i]);
     const int at = shift ? 0 : 3;
     axis.sigma = std::sqrt(
         std::max(0.0, axis.direction.dot(covariance.block<3, 3>(at, at) * axis.direction)));
@@ -100,7 +100,7 @@ Matrix6d covariance_of(const Alignment& at, const RegistrationConfig& config) {
   H = Matrix6d(inverse_arm.transpose() * H * inverse_arm);
   H.diagonal().head<3>().array() += std::pow(config.guess_sigma_m, -2);
   H.diagonal().tail<3>().array() += std::pow(config.guess_sigma_rad, -2);
-  Matrix6d covariance = H.inverse();
+  Matrix6d covariance = inverse_of(H);
   covariance.diagonal().head<3>().array() += std::pow(kShiftFloorM, 2);
   covariance.diagonal().tail<3>().array() += std::pow(kTurnFloorRad, 2);
   return (covariance + covariance.transpose()) / 2;

@@ -5,6 +5,7 @@
 
 #include <Eigen/LU>
 
+#include "nav/linear.hpp"
 #include "tests/nav/scans.hpp"
 
 namespace {
@@ -57,7 +58,7 @@ TEST(Marks, CovarianceCoversTheErrorOver500Fits) {
   for (int run = 0; run < 500; ++run) {
     const auto fit = nav::fit_marks(marks(6, 0.005, 10 + static_cast<std::uint64_t>(run))).value();
     const auto error = nav::motion_between(kTruth, fit.T_reference_reading);
-    chi2 += error.dot(fit.covariance.inverse() * error) / 500;
+    chi2 += error.dot(nav::inverse_of(fit.covariance) * error) / 500;
   }
   EXPECT_NEAR(chi2, 6, 0.6);
 }

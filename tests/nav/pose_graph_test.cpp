@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 #include <limits>
 
+#include "nav/linear.hpp"
 #include "tests/nav/scans.hpp"
 
 namespace {
@@ -61,7 +62,7 @@ double objective_row(const nav::PoseGraph& graph, const std::vector<Eigen::Isome
   rows.resize(static_cast<Eigen::Index>(6 * (graph.links.size() + graph.priors.size())));
   Eigen::Index at = 0;
   const auto put = [&](const Vector6d& residual, const Matrix6d& covariance) {
-    const Matrix6d root = Eigen::LLT<Matrix6d>(covariance.inverse()).matrixU();
+    const Matrix6d root = Eigen::LLT<Matrix6d>(nav::inverse_of(covariance)).matrixU();
     rows.segment<6>(at) = root * residual;
     at += 6;
   };
@@ -142,7 +143,7 @@ TEST(PoseGraph, CovariancesCoverTheErrorOver200Tours) {
     const auto fit = nav::fit_pose_graph(t.graph).value();
     EXPECT_EQ(fit.covariances[0], Matrix6d::Zero());
     const auto error = nav::motion_between(t.truth[4], fit.T_W_S[4]);
-    chi2 += error.dot(fit.covariances[4].inverse() * error) / 200;
+    chi2 += error.dot(nav::inverse_of(fit.covariances[4]) * error) / 200;
   }
   EXPECT_NEAR(chi2, 6, 1);
 }

@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "nav/registration/icp.hpp"
+#include "nav/linear.hpp"
 #include "tests/nav/scans.hpp"
 
 namespace {
@@ -214,7 +215,7 @@ TEST(Registration, CovarianceCoversTheErrorOver40Pairs) {
     const auto result = nav::register_scans(a, b, truth, config);
     ASSERT_EQ(result.verdict, Verdict::accepted) << k << ": " << result.reason;
     const auto error = error_of(result, truth);
-    chi2 += error.dot(result.covariance.inverse() * error) / 40;
+    chi2 += error.dot(nav::inverse_of(result.covariance) * error) / 40;
   }
   RecordProperty("chi2_mean", std::to_string(chi2));
   EXPECT_LT(chi2, 9);    // 6 degrees of freedom: claims no more than it knows,

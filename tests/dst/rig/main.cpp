@@ -4,10 +4,10 @@
 // hold, and says how to see it again.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <string>
 
+#include "mission/main_command_line.hpp"
 #include "tests/dst/rig/matrix.hpp"
 #include "tests/dst/rig/missions.hpp"
 #include "tests/dst/rig/soak.hpp"
@@ -15,7 +15,8 @@
 namespace {
 
 struct Asked {
-  std::uint64_t seed = 1, replay = 0;
+  std::uint64_t seed = 1;
+  std::optional<std::uint64_t> replay;
   int missions = 200, jobs = 1;
   bool matrix = false, verbose = false;
   std::string cell;
@@ -88,24 +89,23 @@ int soak(std::uint64_t seed, double hours) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{
+  mission::CommandLine line(
       "Missions on devices that fail, and on a computer whose clock is set, whose disk fails and "
       "whose power is cut, in virtual time. A run that is cut is gone on with from what its disk "
-      "still has."};
+      "still has.");
   Asked asked;
-  app.add_option("--seed", asked.seed, "of the first mission")->capture_default_str();
-  app.add_option("--missions", asked.missions, "how many, with seeds one after the other")
-      ->check(CLI::Range(1, 100'000'000))
-      ->capture_default_str();
-  app.add_option("--jobs", asked.jobs, "threads")->check(CLI::Range(1, 256))->capture_default_str();
-  app.add_flag("--verbose", asked.verbose, "a line for each mission");
-  app.add_flag("--matrix", asked.matrix, "every fault of every device once, with its reaction");
-  app.add_option("--cell", asked.cell, "of the matrix only this one: \"imu:slow\"");
-  app.add_option("--soak-hours", asked.soak_hours,
-                 "one mission of so many virtual hours in which devices come and go");
-  const auto* again = app.add_option("--replay", asked.replay, "run this one seed, and tell all");
-  CLI11_PARSE(app, argc, argv);
-  if (again->count() > 0) return replay(asked.replay);
+  line.add("--seed", &asked.seed, "of the first mission", {.shows_default = true});
+  line.add("--missions", &asked.missions, "how many, with seeds one after the other",
+           {.within = {{1, 100'000'000}}, .shows_default = true});
+  line.add("--jobs", &asked.jobs, "threads", {.within = {{1, 256}}, .shows_default = true});
+  line.add("--verbose", &asked.verbose, "a line for each mission");
+  line.add("--matrix", &asked.matrix, "every fault of every device once, with its reaction");
+  line.add("--cell", &asked.cell, "of the matrix only this one: \"imu:slow\"");
+  line.add("--soak-hours", &asked.soak_hours,
+           "one mission of so many virtual hours in which devices come and go");
+  line.add("--replay", &asked.replay, "run this one seed, and tell all");
+  if (!line.parse(argc, argv)) return line.exit_code();
+  if (asked.replay) return replay(*asked.replay);
   if (asked.matrix) return matrix(asked.cell);
   return asked.soak_hours > 0 ? soak(asked.seed, asked.soak_hours) : run(asked);
 }

@@ -14,7 +14,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr hal::Duration kFrom = 12s;
+constexpr hal::Duration kSoakFrom = 12s;
 
 double resident_mib() {
   std::ifstream file("/proc/self/statm");
@@ -34,7 +34,7 @@ int descriptors() {
 std::vector<DeviceFault> flickers(std::uint64_t seed, hal::Duration during) {
   support::Dice dice(seed);
   std::vector<DeviceFault> faults;
-  for (hal::Duration at = kFrom + 10s; at < kFrom + during - 2min;) {
+  for (hal::Duration at = kSoakFrom + 10s; at < kSoakFrom + during - 2min;) {
     const auto role = kRoles[static_cast<std::size_t>(dice.below(std::size(kRoles)))];
     const auto fault = static_cast<sim::UnitFault>(1 + dice.below(8));
     const hal::Duration lasts = hal::from_seconds(dice.uniform(0.1, 50));
@@ -65,7 +65,7 @@ SoakResult soak(std::uint64_t seed, hal::Duration during) {
   scenario.seed = seed;
   scenario.releases_after = 5s;
   scenario.faults = flickers(seed, during);
-  scenario.presses = {{Press::base_estop, kFrom, during}};
+  scenario.presses = {{Press::base_estop, kSoakFrom, during}};
   SoakResult result;
   result.faults = static_cast<int>(scenario.faults.size());
   Options options;

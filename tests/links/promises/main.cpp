@@ -1,12 +1,12 @@
 // links_promises: asks links of this machine for what every link promises. One line per promise;
 // exit 0: all kept, 1: some broken, 2: cannot run.
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
 
 #include "drivers/gs_usb.hpp"
 #include "drivers/serial_port.hpp"
 #include "drivers/socketcan.hpp"
+#include "mission/main_command_line.hpp"
 #include "tests/links/promises/can_promises.hpp"
 #include "tests/links/promises/real_rigs.hpp"
 
@@ -158,21 +158,17 @@ int main(int argc, char** argv) {
   Commands commands;
   std::string only;
   bool local = false;
-  CLI::App app("Asks links of this machine for what every link promises.");
-  app.add_option("--can-pair,--gs-usb", can, "Two ends of one bus: can:vcan0,can:vcan0")
-      ->delimiter(',')
-      ->expected(2);
-  app.add_option("--serial-pair", serial,
-                 "Two ports on one line: serial:PATH@BAUD,serial:PATH@BAUD")
-      ->delimiter(',')
-      ->expected(2);
-  app.add_option("--cut", commands.cut, "Shell command that takes the link away");
-  app.add_option("--mend", commands.mend, "Shell command that gives it back; safe to repeat");
-  app.add_option("--silence", commands.silence, "Shell command: nobody acknowledges the first end");
-  app.add_option("--wake", commands.wake, "Shell command that ends that; safe to repeat");
-  app.add_option("--only", only, "Only promises with this in their names");
-  app.add_flag("--local", local, "TCP, UDP, pseudo terminals and Modbus of this machine");
-  CLI11_PARSE(app, argc, argv);
+  mission::CommandLine line("Asks links of this machine for what every link promises.");
+  line.add("--can-pair,--gs-usb", &can, "Two ends of one bus: can:vcan0,can:vcan0", {.pair = true});
+  line.add("--serial-pair", &serial, "Two ports on one line: serial:PATH@BAUD,serial:PATH@BAUD",
+           {.pair = true});
+  line.add("--cut", &commands.cut, "Shell command that takes the link away");
+  line.add("--mend", &commands.mend, "Shell command that gives it back; safe to repeat");
+  line.add("--silence", &commands.silence, "Shell command: nobody acknowledges the first end");
+  line.add("--wake", &commands.wake, "Shell command that ends that; safe to repeat");
+  line.add("--only", &only, "Only promises with this in their names");
+  line.add("--local", &local, "TCP, UDP, pseudo terminals and Modbus of this machine");
+  if (!line.parse(argc, argv)) return line.exit_code();
   Judge judge(only);
   try {
     if (!can.empty())
