@@ -70,6 +70,8 @@ PastSummary summary_of(const json::value& root) {
   for (const json::value& dropped : root.at("dropped").as_array())
     if (dropped.at("name").as_string().starts_with("NBV "))
       summary.asked.push_back(asked_view(dropped));
+  if (const json::value* left_out = root.as_object().if_contains("left_out"))
+    for (const json::value& view : left_out->as_array()) summary.asked.push_back(asked_view(view));
   return summary;
 }
 

@@ -15,7 +15,7 @@
 
 namespace mission {
 
-// A place where the run took a next best view, or gave one up.
+// A place where the run took a next best view, gave one up, or left one out.
 struct AskedView {
   std::string area;
   Eigen::Vector2d at_m{0, 0};

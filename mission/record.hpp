@@ -103,6 +103,13 @@ struct DroppedStation {
   std::optional<Instead> instead = std::nullopt;  // Nothing: it was not asked for.
 };
 
+// A place for a next best view to which no road led.
+struct LeftOutView {
+  std::string area;
+  hal::Pose2 planned;
+  std::uint32_t voxels{};  // NextView::voxels
+};
+
 // Phase I for one free area.
 struct AreaPlan {
   nav::FreeArea area;
@@ -196,6 +203,7 @@ struct RunRecord {
   std::vector<AreaPlan> plans;
   std::vector<ScanRecord> scans;
   std::vector<DroppedStation> dropped;
+  std::vector<LeftOutView> left_out;                   // Next best views that were never tried.
   std::vector<std::vector<Eigen::Vector2d>> driven_m;  // Believed tracks, one per leg.
   ScannerConfig scanner;
   double radius_m{};  // Of the robot.

@@ -51,7 +51,7 @@ void Roads::close_anew(const std::map<int, std::vector<Eigen::Vector2d>>& center
   open_ = mapped_;
   for (const Closing& closing : closings_) open_ = nav::subtract(open_, closing.squares);
   for (const auto& [scan, shown_m] : centers_m) close_for_good(scan, shown_m, side_m);
-  rebuild();
+  openings_ += rebuild();
 }
 
 void Roads::close_for_now(const std::vector<Eigen::Vector2d>& centers_m, double side_m) {
@@ -68,16 +68,17 @@ bool Roads::reopen() {
   closed_twice_ = nav::unite(closed_twice_, nav::intersect(closed_once_, closed_for_now_));
   closed_once_ = nav::unite(closed_once_, closed_for_now_);
   closed_for_now_.clear();
-  rebuild();
+  openings_ += rebuild();
   return true;
 }
 
-void Roads::rebuild() {
+bool Roads::rebuild() {
   nav::Polygons drivable = closed_for_now_.empty() ? open_ : nav::subtract(open_, closed_for_now_);
-  if (same(drivable, area_.drivable)) return;  // Closed, or open, already.
+  if (same(drivable, area_.drivable)) return false;  // Closed, or open, already.
   area_.drivable = std::move(drivable);
   area_.standable = nav::offset(area_.drivable, -nav::to_mm({robot_radius_m_, 0}).x);
   roadmap_ = nav::Roadmap::build(area_, robot_radius_m_);
+  return true;
 }
 
 }  // namespace mission

@@ -25,6 +25,9 @@ class Roads {
   // is closed for good, so that nothing is tried for ever.
   void close_for_now(const std::vector<Eigen::Vector2d>& centers_m, double side_m);
   bool reopen();  // False: nothing was closed for now.
+  bool is_closed_for_now() const { return !closed_for_now_.empty(); }
+  // So often roads changed because something was open again.
+  int openings() const { return openings_; }
 
   const nav::FreeArea& area() const { return area_; }
   const nav::Polygons& mapped() const { return mapped_; }  // Drivable as the map has it.
@@ -36,13 +39,14 @@ class Roads {
     nav::Polygons squares;
   };
   void close_for_good(int scan, const std::vector<Eigen::Vector2d>& centers_m, double side_m);
-  void rebuild();
+  bool rebuild();  // False: the roads are as they were.
 
   nav::FreeArea area_;
   nav::Polygons mapped_;
   nav::Polygons open_;             // Drivable but for what is closed for now.
   std::vector<Closing> closings_;  // What open_ lacks, in the order in which it came.
   nav::Polygons closed_for_now_, closed_once_, closed_twice_;
+  int openings_{};
   double robot_radius_m_;
   nav::Roadmap roadmap_;
 };

@@ -228,6 +228,12 @@ void describe(Fields& fields, StationDropped& of) {
 }
 
 template <class Fields>
+void describe(Fields& fields, ViewsLeftOut& of) {
+  fields("views", of.views);
+  fields("closed_for_now", of.closed_for_now);
+}
+
+template <class Fields>
 void describe(Fields& fields, StationReplaced::Station& of) {
   fields("name", of.name);
   fields("at", of.at);
@@ -339,6 +345,7 @@ const std::map<std::string, Take>& takes() {
       {"scan", take_scan},
       {"tour_closed", take_closing},
       {"dropped", [](auto& h, const auto& v) { h.steps.emplace_back(read_as<StationDropped>(v)); }},
+      {"left_out", [](auto& h, const auto& v) { h.steps.emplace_back(read_as<ViewsLeftOut>(v)); }},
       {"replaced", take_replacement},
       {"stopped",
        [](auto& h, const auto& v) { h.last_stop = std::string(v.at("what").as_string()); }},
@@ -395,6 +402,9 @@ EventText event_of(const StationDropped& event) {
 }
 EventText event_of(const StationReplaced& event) {
   return text_of("replaced", event);
+}
+EventText event_of(const ViewsLeftOut& event) {
+  return text_of("left_out", event);
 }
 EventText event_of(const RunEnded& event) {
   return text_of("ended", event);

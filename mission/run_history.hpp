@@ -87,6 +87,12 @@ struct StationDropped {
   std::optional<NextView> view;  // Phase II.
 };
 
+// Next best views to which no road led.
+struct ViewsLeftOut {
+  std::vector<NextView> views;
+  bool closed_for_now{};  // Roads were, and are open when the run goes on.
+};
+
 // Stations in place of one that was dropped; they are then stations of the plan as all others.
 struct StationReplaced {
   struct Station {
@@ -110,7 +116,8 @@ struct RunResumed {
   std::optional<int> scan_lost;  // Damaged: taken again. Always the last.
 };
 
-using RunStep = std::variant<LegDone, ScanDone, TourClosed, StationDropped, StationReplaced>;
+using RunStep =
+    std::variant<LegDone, ScanDone, TourClosed, StationDropped, StationReplaced, ViewsLeftOut>;
 
 struct RunHistory {
   std::optional<RunBegun> begun;
@@ -143,6 +150,7 @@ EventText event_of(const ScanDone& event);
 EventText event_of(const TourClosed& event);
 EventText event_of(const StationDropped& event);
 EventText event_of(const StationReplaced& event);
+EventText event_of(const ViewsLeftOut& event);
 EventText event_of(const RunEnded& event);
 EventText event_of(const RunResumed& event);
 EventText event_of(const Whereabouts& event);  // On the way.

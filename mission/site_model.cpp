@@ -500,6 +500,11 @@ void SiteModel::exclude(const planning::Voxel& cell) {
     if (cells_[i].voxel == cell) excluded_[i] = 1;
 }
 
+void SiteModel::include(const planning::Voxel& cell) {
+  for (std::size_t i = 0; i < cells_.size(); ++i)
+    if (cells_[i].voxel == cell) excluded_[i] = 0;
+}
+
 VoxelCounts SiteModel::counts() const {
   const auto counts = map_.counts();
   return {.seen_empty = counts.seen_empty,

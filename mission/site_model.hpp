@@ -135,8 +135,9 @@ class SiteModel {
                const std::vector<DensityGoal::PastScan>& scans,
                const std::vector<std::uint64_t>& thin_set_aside);
 
-  // Never ask for a view from this cell again.
+  // Never ask for a view from this cell again; or do, after all.
   void exclude(const planning::Voxel& cell);
+  void include(const planning::Voxel& cell);
 
   VoxelCounts counts() const;
   // Whether any view could still help, and what none can see (site_leftover.cpp). Several tallies.

@@ -180,6 +180,15 @@ json::array dropped_json(const RunRecord& record) {
   return dropped;
 }
 
+// "planned" as of what was dropped.
+json::array left_out_json(const RunRecord& record) {
+  json::array left_out;
+  for (const LeftOutView& view : record.left_out)
+    left_out.push_back(
+        {{"area", view.area}, {"planned", pose_json(view.planned)}, {"voxels", view.voxels}});
+  return left_out;
+}
+
 json::value truth_json(const std::optional<Truth>& truth) {
   if (!truth) return nullptr;
   const auto visible = static_cast<double>(truth->surface_visible);
@@ -318,6 +327,7 @@ json::object summarise(const RunRecord& record, const ProductFacts& products) {
   for (std::size_t i = 0; i < record.scans.size(); ++i) scans.push_back(scan_json(record, i));
   summary["scans"] = std::move(scans);
   summary["dropped"] = dropped_json(record);
+  summary["left_out"] = left_out_json(record);
   json::array repairs;
   for (const auto& repair : record.repairs) {
     repairs.push_back({{"where", repair.where}, {"what", repair.what}});

@@ -135,6 +135,7 @@ hal::Task<void> Survey::run() {
   note_gnss();
   note_registration();
   note_moving();
+  note_left_out();
   note_ground();
   note_energy();
   record_.set_aside = model_->voxels_set_aside();
@@ -313,9 +314,12 @@ hal::Task<void> Survey::tour(std::size_t t) {
 
 hal::Task<void> Survey::refine() {
   while (views_taken_ < config_.phase2.views_max) {
+    bring_back();
+    left_out_now_ = false;
     std::vector<NextView> views;
     const std::function<void()> look = [&] { views = choose_views(); };
     co_await parts_.compute.run(look);
+    if (views.empty() && open_roads()) continue;
     if (views.empty() && scans_closed_ < static_cast<int>(record_.scans.size())) {
       co_await close_tour();
       continue;  // The map may show something worth seeing now.
@@ -327,12 +331,17 @@ hal::Task<void> Survey::refine() {
       if (model_->set_aside() > 0)
         reason +=
             fmt::format("; {} voxels stayed unseen after two tries each", model_->set_aside());
+      if (!left_out_.empty())
+        reason +=
+            fmt::format("; {} places were left out, as no road leads there", left_out_.size());
       co_await leave(std::move(reason), true);
       co_return;
     }
     const bool done = co_await take_best_of(views);
     views_taken_ += done;
     const bool some_not_faced = config_.phase2.choose == "gain" && !views.empty() && !battery_low_;
+    // Those that were left out are gone by the next look.
+    if (!done && !battery_low_ && (left_out_now_ || open_roads())) continue;
     if (!done && !some_not_faced) {
       co_await close_tour();
       std::string reason =
@@ -347,14 +356,17 @@ hal::Task<void> Survey::refine() {
   co_await leave(std::move(reason), false);
 }
 
-// The best that can be reached; those tried stay excluded, and leave the views. False: none can.
+// The best that can be reached; those tried stay excluded, and leave the views, as do those that no
+// road leads to. False: none can.
 hal::Task<bool> Survey::take_best_of(std::vector<NextView>& views) {
   for (;;) {
     std::optional<std::size_t> chosen;
+    ViewsLeftOut left_out;
     const std::function<void()> choose = [&, from_m = Eigen::Vector2d(pilot_.pose().position_m)] {
-      chosen = choose_view(views, from_m);
+      chosen = choose_view(views, from_m, left_out);
     };
     co_await parts_.compute.run(choose);
+    if (!left_out.views.empty()) tell(event_of(left_out));
     if (!chosen) co_return false;
     const NextView view = views[*chosen];
     views.erase(views.begin() + static_cast<std::ptrdiff_t>(*chosen));

@@ -119,6 +119,7 @@ class Survey {
   void redo(const ScanDone& done);
   void redo(const TourClosed& closed);
   void redo(const StationDropped& dropped);
+  void redo(const ViewsLeftOut& left_out);
   void mend_scans();
   void tour_the_rest();
   bool keeps_beams() const;
@@ -183,7 +184,13 @@ class Survey {
 
   std::vector<NextView> choose_views();
   std::optional<std::size_t> choose_view(std::vector<NextView>& views,
-                                         const Eigen::Vector2d& from_m);
+                                         const Eigen::Vector2d& from_m, ViewsLeftOut& left_out);
+  void leave_out(std::vector<NextView>& views, const Eigen::Vector2d& from_m,
+                 ViewsLeftOut& left_out);
+  void bring_back();
+  bool count_again();
+  bool open_roads();
+  void note_left_out();
   hal::Task<bool> take_best_of(std::vector<NextView>& views);
   hal::Task<void> leave(std::string reason, bool stopped_for_gain);
   void note_leftover(bool stopped_for_gain);
@@ -228,6 +235,9 @@ class Survey {
   bool battery_low_{};               // For the last stop that was thought of.
   bool put_off_{};  // The stop was not visited: the stations left get a new order first.
   bool no_way_{};   // The stop was dropped because no road leads there any more.
+  std::vector<NextView> left_out_;      // No road led there,
+  int left_out_at_{};                   // when roads had opened so often,
+  bool left_out_now_{};                 // since the last look for views.
   std::set<std::string> replacements_;  // Names of stations in place of others.
   std::optional<Progress> shown_;
   Eigen::Vector2d zone_at_m_{0, 0};  // Where the zone was looked up last.

@@ -104,11 +104,23 @@ void Survey::redo(const TourClosed& closed) {
     scan.claim(pose.covariance);
   }
   fill_anew(false);
+  (void)count_again();
 }
 
 void Survey::redo(const StationDropped& dropped) {
   record_.dropped.push_back(dropped.station);
   if (dropped.view) model_->exclude(dropped.view->cell.voxel);
+}
+
+// Roads that were closed for now are open again, and what lies behind them counts again.
+void Survey::redo(const ViewsLeftOut& left_out) {
+  (void)count_again();
+  if (left_out.closed_for_now) return;
+  for (const NextView& view : left_out.views) {
+    model_->exclude(view.cell.voxel);
+    left_out_.push_back(view);
+  }
+  left_out_at_ = roads_[static_cast<std::size_t>(tasks_.start_area)].openings();
 }
 
 void Survey::redo(const StationReplaced& replaced) {

@@ -61,6 +61,10 @@ class Roadmap {
                              NoRoute* why = nullptr,
                              Smoothing smoothing = Smoothing::shortcut) const;
 
+  // Why no way leads from there to each of these, by one search: NoRoute::none where one does.
+  std::vector<NoRoute> why_not(const Eigen::Vector2d& from_m,
+                               const std::vector<Eigen::Vector2d>& to_m) const;
+
   // Lengths of the ways between all pairs: row from, column to; infinite where there is none.
   // Dijkstra once per point; without smoothing it equals route(). Symmetric, but for points closer
   // to an obstacle than the radius: such a point can be left, not reached.
@@ -161,6 +165,7 @@ class Roadmap {
   std::optional<std::vector<Eigen::Vector2d>> trace(const Tree& tree,
                                                     const std::vector<Link>& starts,
                                                     const std::vector<Link>& goals) const;
+  static NoRoute why_not_joined(const std::vector<Link>& starts, const std::vector<Link>& goals);
   std::optional<std::vector<Eigen::Vector2d>> way(const Eigen::Vector2d& from_m,
                                                   const Eigen::Vector2d& to_m, NoRoute& why) const;
   Route finish(std::vector<Eigen::Vector2d> points_m, Smoothing smoothing) const;

@@ -219,6 +219,11 @@ std::optional<std::vector<Vector2d>> Roadmap::trace(const Tree& tree,
   return backwards;
 }
 
+NoRoute Roadmap::why_not_joined(const std::vector<Link>& starts, const std::vector<Link>& goals) {
+  if (starts.empty()) return NoRoute::from_enclosed;
+  return goals.empty() ? NoRoute::to_enclosed : NoRoute::not_connected;
+}
+
 std::optional<std::vector<Vector2d>> Roadmap::way(const Vector2d& from_m, const Vector2d& to_m,
                                                   NoRoute& why) const {
   why = check_ends(from_m, to_m);
@@ -228,9 +233,7 @@ std::optional<std::vector<Vector2d>> Roadmap::way(const Vector2d& from_m, const 
   const std::vector<Link> goals = links(to_m, false);
   auto found = trace(search(starts, goals, &to_m), starts, goals);
   if (found) return found;
-  why = starts.empty()  ? NoRoute::from_enclosed
-        : goals.empty() ? NoRoute::to_enclosed
-                        : NoRoute::not_connected;
+  why = why_not_joined(starts, goals);
   if (blocks_.empty()) return std::nullopt;
   Roadmap unblocked = *this;
   unblocked.unblock_all();
@@ -264,6 +267,23 @@ std::optional<Route> Roadmap::route(const Vector2d& from_m, const Vector2d& to_m
   if (why != nullptr) *why = reason;
   if (!points_m) return std::nullopt;
   return finish(std::move(*points_m), smoothing);
+}
+
+std::vector<NoRoute> Roadmap::why_not(const Vector2d& from_m,
+                                      const std::vector<Vector2d>& to_m) const {
+  const std::vector<Link> starts = links(from_m, true);
+  const Tree tree = search(starts, {}, nullptr);
+  std::vector<NoRoute> all;
+  for (const Vector2d& goal_m : to_m) {
+    NoRoute why = check_ends(from_m, goal_m);
+    if (why == NoRoute::none && !sees(from_m, goal_m)) {
+      const std::vector<Link> goals = links(goal_m, false);
+      if (!trace(tree, starts, goals)) why = why_not_joined(starts, goals);
+      if (why != NoRoute::none && !blocks_.empty()) (void)way(from_m, goal_m, why);
+    }
+    all.push_back(why);
+  }
+  return all;
 }
 
 Eigen::MatrixXd Roadmap::lengths_m(const std::vector<Vector2d>& points_m,

@@ -6,6 +6,7 @@
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 #include <cstdlib>
+#include <fstream>
 #include <map>
 #include <sstream>
 
@@ -99,7 +100,8 @@ Outcome run(const RandomSite& site) {
 
 struct Sums {
   int missions{}, stations{}, scanned{}, dropped{}, instead{}, views_dropped{}, met{}, legs{};
-  int rough{};  // Sites whose ground is closed in places.
+  int left_out{};  // Views.
+  int rough{};     // Sites whose ground is closed in places.
   double waited_s{}, driven_m{}, hours{}, nearest_person_m = 1e9;
   std::map<std::string, int> reasons;
 
@@ -114,6 +116,7 @@ struct Sums {
       if (drop.instead) instead += static_cast<int>(drop.instead->stations.size());
     for (const std::string& note : record.notes)
       rough += note.find("keeps off it") != std::string::npos;
+    left_out += static_cast<int>(record.left_out.size());
     met += record.moving.obstacles_met;
     legs += record.moving.legs;
     waited_s += record.moving.waited_s;
@@ -126,11 +129,12 @@ struct Sums {
   void print() const {
     std::printf(
         "%d missions, %.1f h, %.1f km: %d times something was in the way on %d legs, waited %.0f "
-        "s; %d scans; %d of %d stations and %d views dropped, %d stations instead; ground closed "
+        "s; %d scans; %d of %d stations and %d views dropped, %d left out, %d stations instead; "
+        "ground closed "
         "on "
         "%d sites; people came as near as %.2f m\n",
         missions, hours, driven_m / 1000, met, legs, waited_s, scanned, dropped, stations,
-        views_dropped, instead, rough, nearest_person_m);
+        views_dropped, left_out, instead, rough, nearest_person_m);
     for (const auto& [reason, count] : reasons) std::printf("  %d: %s\n", count, reason.c_str());
   }
 };

@@ -65,6 +65,22 @@ TEST(Roads, StayClosedWhereTheRobotTouchedSomething) {
   EXPECT_TRUE(nav::contains(roads.area().drivable, nav::to_mm({12, 1})));
 }
 
+TEST(Roads, SayWhenSomethingIsOpenAgain) {
+  mission::Roads roads(lane(), kRadiusM);
+  EXPECT_FALSE(roads.reopen());
+  roads.close(wall(6), kSideM, 1);
+  roads.close_anew({{1, wall(6)}}, kSideM);
+  EXPECT_EQ(roads.openings(), 0);
+  roads.close_anew({}, kSideM);
+  EXPECT_EQ(roads.openings(), 1);
+  roads.close_for_now(wall(12), kSideM);
+  EXPECT_TRUE(roads.is_closed_for_now());
+  EXPECT_EQ(roads.openings(), 1);
+  EXPECT_TRUE(roads.reopen());
+  EXPECT_FALSE(roads.is_closed_for_now());
+  EXPECT_EQ(roads.openings(), 2);
+}
+
 TEST(Roads, KeepWhatIsClosedForNow) {
   mission::Roads roads(lane(), kRadiusM);
   roads.close(wall(6), kSideM, 1);

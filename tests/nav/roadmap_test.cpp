@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <boost/polygon/voronoi.hpp>
 #include <map>
+#include <set>
 
 #include "nav/noding.hpp"
 #include "nav/polygons.hpp"
@@ -243,6 +244,32 @@ TEST(Roadmap, NeverJoinsPartsBetweenWhichTheRobotDoesNotFit) {
     }
   }
   EXPECT_GT(pairs, 50);
+}
+
+// From standable points to any, also outside and in other parts; without and with blocks.
+TEST(Roadmap, KnowsOfManyGoalsAtOnceWhyNoWayLeadsThere) {
+  std::set<NoRoute> told;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Dice dice(seed);
+    const FreeArea area = random_area(dice, {60, 120, 6, 9}, kRadiusM);
+    Roadmap roadmap = Roadmap::build(area, kRadiusM);
+    for (const bool blocks : {false, true}) {
+      if (blocks) roadmap.block(random_point(dice, area.standable, 60), 4);
+      const Vector2d from = random_point(dice, area.standable, 60);
+      std::vector<Vector2d> goals;
+      for (int i = 0; i < 20; ++i) goals.emplace_back(dice.uniform(0, 60), dice.uniform(0, 60));
+      for (int i = 0; i < 10; ++i) goals.push_back(random_point(dice, area.standable, 60));
+      const std::vector<NoRoute> whys = roadmap.why_not(from, goals);
+      ASSERT_EQ(whys.size(), goals.size());
+      for (std::size_t i = 0; i < goals.size(); ++i) {
+        NoRoute why{};
+        (void)roadmap.route(from, goals[i], &why);
+        EXPECT_EQ(whys[i], why) << "seed " << seed << " to " << goals[i].transpose();
+        told.insert(why);
+      }
+    }
+  }
+  EXPECT_GE(told.size(), 5U);
 }
 
 TEST(Roadmap, DijkstraAndAStarFindTheSameLengths) {
