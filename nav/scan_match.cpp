@@ -22,16 +22,35 @@ Eigen::Rotation2Dd turn_of(const hal::Pose2& pose) {
 
 }  // namespace
 
-WallMap::WallMap(std::span<const WallSegment> walls, const WallMapConfig& config) {
+std::vector<WallMap::Wall> WallMap::drawn(std::span<const WallSegment> walls, double spacing_m) {
+  std::vector<Wall> points;
   for (const WallSegment& wall : walls) {
     const Eigen::Vector2d along = wall.to_m - wall.from_m;
     const double length_m = along.norm();
     if (!std::isfinite(length_m) || length_m <= 0) continue;
-    const int pieces = std::max(1, static_cast<int>(std::ceil(length_m / config.spacing_m)));
+    const int pieces = std::max(1, static_cast<int>(std::ceil(length_m / spacing_m)));
     for (int i = 0; i <= pieces; ++i)
-      walls_.push_back({wall.from_m + along * (static_cast<double>(i) / pieces),
+      points.push_back({wall.from_m + along * (static_cast<double>(i) / pieces),
                         Eigen::Vector2d(-along.y(), along.x()) / length_m});
   }
+  return points;
+}
+
+WallMap::WallMap(std::span<const WallSegment> walls, const WallMapConfig& config)
+    : walls_(drawn(walls, config.spacing_m)) {
+  index(config);
+}
+
+WallMap::WallMap(std::span<const WallSegment> walls, std::span<const Eigen::Vector2d> W_points_m,
+                 const WallMapConfig& config)
+    : WallMap(W_points_m, config) {
+  std::vector<Wall> beside;
+  for (const Wall& wall : drawn(walls, config.spacing_m)) {
+    const Wall* shown = nearest(wall.point_m);
+    if (shown == nullptr || (shown->point_m - wall.point_m).norm() > kShownM)
+      beside.push_back(wall);
+  }
+  walls_.insert(walls_.end(), beside.begin(), beside.end());
   index(config);
 }
 
@@ -190,7 +209,7 @@ std::vector<Row> rows_of(const WallMap& map, std::span<const Eigen::Vector2d> B_
   return rows;
 }
 
-Equations equations_of(const std::vector<Row>& rows, double radius_m,
+Equations equations_of(const std::vector<Row>& rows, double radius_m, double noise_m,
                        const ScanMatchConfig& config) {
   Equations e;
   e.radius_m = radius_m;
@@ -198,7 +217,7 @@ Equations equations_of(const std::vector<Row>& rows, double radius_m,
   for (const Row& row : rows) sizes.push_back(std::abs(row.residual_m));
   const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
   std::nth_element(sizes.begin(), middle, sizes.end());
-  e.sigma_m = std::max(1.4826 * *middle, config.noise_floor_m);
+  e.sigma_m = std::max(1.4826 * *middle, noise_m);
   const double scale2 = std::pow(config.kernel_scale * e.sigma_m, 2);
   for (const Row& row : rows) {
     const double w = std::pow(scale2 / (scale2 + row.residual_m * row.residual_m), 2);
@@ -260,6 +279,7 @@ ScanMatch match_from(const WallMap& map, std::span<const Eigen::Vector2d> B_poin
   ScanMatch match;
   match.pose = guess;
   double reach_m = config.reach_start_m;
+  double noise_m = std::max(config.noise_start_m, config.noise_floor_m);
   Equations e;
   for (int step = 0; step < config.steps_max; ++step) {
     const auto rows = rows_of(map, B_points_m, match.pose, reach_m, radius_m);
@@ -267,7 +287,7 @@ ScanMatch match_from(const WallMap& map, std::span<const Eigen::Vector2d> B_poin
       match.reason = fmt::format("only {} beams end near walls of the map", rows.size());
       break;
     }
-    e = equations_of(rows, radius_m, config);
+    e = equations_of(rows, radius_m, noise_m, config);
     const Axes<3> axes = axes_of(e.H);
     Eigen::Vector3d motion = Eigen::Vector3d::Zero();
     for (int i = 0; i < 3; ++i)
@@ -276,7 +296,9 @@ ScanMatch match_from(const WallMap& map, std::span<const Eigen::Vector2d> B_poin
     match.pose.position_m += motion.head<2>();
     match.pose.heading_rad =
         std::remainder(match.pose.heading_rad + motion[2] / radius_m, 2 * std::numbers::pi);
-    if (reach_m <= config.reach_end_m && motion.norm() < 1e-3) break;
+    const bool narrow = reach_m <= config.reach_end_m && noise_m <= config.noise_floor_m;
+    if (narrow && motion.norm() < 1e-3) break;
+    noise_m = std::max(config.noise_floor_m, 0.7 * noise_m);
     reach_m = std::max(config.reach_end_m, 0.8 * reach_m);
   }
   if (match.reason.empty()) match.covariance = covariance_of(e, config, match.free);
@@ -300,7 +322,7 @@ ScanMatch match_scan(const WallMap& map, std::span<const Eigen::Vector2d> B_poin
       std::max(0.1, std::sqrt(squares / static_cast<double>(B_points_m.size())));
   ScanMatch best = match_from(map, B_points_m, guess, radius_m, config);
   const auto sure = [&] { return best.good && best.score >= config.score_sure; };
-  if (sure()) return best;
+  if (sure() || !config.searches) return best;
   // Where the robot may be, before the turns that it may have made.
   std::vector<Eigen::Vector2d> places;
   for (int x = -1; x <= 1; ++x)

@@ -33,6 +33,11 @@ class WallMap {
   WallMap(std::span<const WallSegment> walls, const WallMapConfig& config);
   // Points as scans show them; at most one in a quarter cell is kept.
   WallMap(std::span<const Eigen::Vector2d> W_points_m, const WallMapConfig& config);
+  // Both. Where scans show something, what is drawn so near it is left out: it is the same wall,
+  // drawn a little beside.
+  static constexpr double kShownM = 0.5;
+  WallMap(std::span<const WallSegment> walls, std::span<const Eigen::Vector2d> W_points_m,
+          const WallMapConfig& config);
 
   struct Wall {
     Eigen::Vector2d point_m{0, 0};
@@ -43,6 +48,7 @@ class WallMap {
   const std::vector<Wall>& walls() const { return walls_; }
 
  private:
+  static std::vector<Wall> drawn(std::span<const WallSegment> walls, double spacing_m);
   void find_normals(const WallMapConfig& config);
   void index(const WallMapConfig& config);
   std::size_t cell_of(const Eigen::Vector2d& W_point_m) const;
@@ -59,6 +65,9 @@ struct ScanMatchConfig {
   int steps_max = 40;
   double reach_start_m = 1.5, reach_end_m = 0.4;
   double noise_floor_m = 0.03;
+  // What it begins with; it narrows to the floor. A few beams that tell of a direction alone are
+  // heeded then, though they are farther off than the many that do not.
+  double noise_start_m = 0.03;
   double kernel_scale = 2.5;     // In robust sigmas (Geman and McClure).
   double correlated_beams = 12;  // So many beams count as one independent measurement.
   double map_sigma_m = 0.03;     // How far walls may be off: no match is better.
@@ -72,6 +81,7 @@ struct ScanMatchConfig {
   // highest is taken; with a lower one still, other headings all around.
   double score_sure = 0.85, score_lost = 0.75;
   double search_m = 0.5, search_rad = 0.2;
+  bool searches = true;  // False: only from the guess.
 };
 
 struct ScanMatch {
