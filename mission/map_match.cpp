@@ -17,13 +17,6 @@ constexpr double kFarM = 40;
 // judges the pose besides.
 constexpr double kFitMin = 0.4;
 
-std::vector<nav::WallSegment> walls_of(const nav::SiteMap& map) {
-  std::vector<nav::WallSegment> walls;
-  for (const nav::SegmentMm& edge : nav::edges(map.obstacles))
-    walls.push_back({nav::to_m(edge.a), nav::to_m(edge.b)});
-  return walls;
-}
-
 nav::WallMapConfig wall_config() {
   nav::WallMapConfig config;
   config.cell_m = 0.25;
@@ -32,6 +25,13 @@ nav::WallMapConfig wall_config() {
 }
 
 }  // namespace
+
+std::vector<nav::WallSegment> walls_of(const nav::SiteMap& map) {
+  std::vector<nav::WallSegment> walls;
+  for (const nav::SegmentMm& edge : nav::edges(map.obstacles))
+    walls.push_back({nav::to_m(edge.a), nav::to_m(edge.b)});
+  return walls;
+}
 
 MapMatcher::MapMatcher(const nav::SiteMap& map, const ScannerConfig& scanner)
     : scanner_(scanner), walls_(walls_of(map), wall_config()) {}

@@ -10,6 +10,9 @@
 
 namespace mission {
 
+// The outlines of its obstacles.
+std::vector<nav::WallSegment> walls_of(const nav::SiteMap& map);
+
 class MapMatcher {
  public:
   // Of a site whose obstacles span up to 4 km x 4 km; throws std::invalid_argument beyond.

@@ -30,6 +30,11 @@ constexpr double kSeenAroundM = 3.0;   // so far around what is in the way,
 constexpr double kKnownWallM = 0.15;   // but not along the walls of the map.
 constexpr double kNearEnoughM = 0.25;  // Of a goal that cannot be reached.
 constexpr hal::Duration kAskAgain = std::chrono::milliseconds(200);
+// Profiles are laid over walls so far apart, or turned by so much; and so far where it stands.
+constexpr double kLaidEveryM = 1, kLaidEveryRad = 0.35, kLaidStandingM = 0.2;
+// Fixes that claim more tell less than walls do; and so long after the last one.
+constexpr double kGoodFixM = 0.15;
+constexpr hal::Duration kGnssPoorAfter = std::chrono::seconds(2);
 
 namespace errc = boost::system::errc;
 
@@ -116,7 +121,7 @@ Pilot::Pilot(const RobotConfig& config, hal::Clock& clock, hal::Devices& devices
 
 hal::Task<void> Pilot::track() {
   using boost::asio::experimental::awaitable_operators::operator&&;
-  co_await (track_travel() && track_imu() && track_gnss() && track_obstacles());
+  co_await (track_travel() && track_imu() && track_gnss() && track_obstacles() && track_walls());
 }
 
 hal::Task<void> Pilot::track_travel() {
@@ -149,7 +154,10 @@ hal::Task<void> Pilot::track_gnss() {
       continue;
     }
     const nav::Gate gate = localizer_.correct(*fix);
-    if (gate != nav::Gate::rejected) alone_.correct(*fix);
+    if (gate != nav::Gate::rejected) {
+      alone_.correct(*fix);
+      if (fix->sigma_m <= kGoodFixM) told_by_gnss_at_ = clock_.now();
+    }
     sensors_.heard(SensorLog::Sensor::gnss, clock_.now());
     sensors_.judged(gate, clock_.now());
   }
@@ -177,7 +185,63 @@ hal::Task<void> Pilot::track_obstacles() {
         Eigen::Vector2d(std::cos(looks_from.heading_rad), std::sin(looks_from.heading_rad));
     looked_at_ = clock_.now();
     obstacles_.add(*profile, looks_from, clock_.now());
+    if (walls_) profile_ = std::move(*profile);
   }
+}
+
+void Pilot::know_walls(hal::Compute& compute, std::shared_ptr<const nav::WallMap> walls) {
+  compute_ = &compute;
+  walls_ = std::move(walls);
+}
+
+hal::Task<void> Pilot::track_walls() {
+  while (devices_.obstacles) {
+    co_await clock_.sleep_for(kAskAgain);
+    if (wants_walls()) co_await lay_over_walls();
+  }
+}
+
+bool Pilot::has_good_gnss() const {
+  return told_by_gnss_at_ && clock_.now() - *told_by_gnss_at_ <= kGnssPoorAfter;
+}
+
+// The same place is not asked twice: it would say the same, and count as if it were news.
+bool Pilot::wants_walls() const {
+  if (!walls_ || !profile_ || has_good_gnss()) return false;
+  const double way_m = travelled_m_ - laid_at_m_;
+  const double turned_rad = std::abs(hal::wrapped(pose().heading_rad - laid_at_rad_));
+  return way_m >= kLaidEveryM || turned_rad >= kLaidEveryRad ||
+         (localizer_.standing() && way_m >= kLaidStandingM);
+}
+
+// Beside the loop: profiles go on to be looked at for obstacles meanwhile.
+hal::Task<void> Pilot::lay_over_walls() {
+  nav::MovingProfile seen;
+  seen.profile = std::move(*profile_);
+  profile_.reset();
+  laid_at_m_ = travelled_m_;
+  laid_at_rad_ = pose().heading_rad;
+  const auto beams = static_cast<double>(seen.profile.ranges_m.size());
+  const hal::Time last =
+      seen.profile.stamp + hal::from_seconds(std::max(0.0, beams - 1) * seen.profile.beam_period_s);
+  seen.T_B_L = {{config_.obstacles.offset_x_m, 0}, 0};
+  seen.height_m = config_.obstacles.height_m;
+  seen.R_level = Eigen::AngleAxisd(-pose().heading_rad, Eigen::Vector3d::UnitZ()) *
+                 localizer_.T_W_B().linear();
+  seen.W_first = localizer_.pose_at(seen.profile.stamp);
+  seen.W_last = localizer_.pose_at(last);
+  nav::ProfileMatch found;
+  const std::function<void()> lay = [&found, &seen, walls = walls_, sigmas = covariance()] {
+    found = nav::match_profile(*walls, seen, sigmas);
+  };
+  co_await compute_->run(lay);
+  if (!found.match.good) {
+    ++(found.refused ? profiles_.refused : profiles_.unlike);
+    co_return;
+  }
+  const nav::Correction done =
+      localizer_.add(nav::PoseFix{last, found.match.pose, found.match.covariance});
+  ++(done.gate == nav::Gate::rejected ? profiles_.refused : profiles_.used);
 }
 
 hal::Task<LegEnd> Pilot::drive_to(Roads& roads, hal::Pose2 goal) {
@@ -193,6 +257,7 @@ hal::Task<LegEnd> Pilot::drive_to(Roads& roads, hal::Pose2 goal) {
   LegEnd leg = co_await drive_on(roads, goal);
   looks_since_.reset();
   if (devices_.obstacles) (void)co_await devices_.obstacles->stop();
+  profile_.reset();
   obstacles_.clear();  // By the next leg the world has moved on.
   leg.driven_m = travelled_m_ - before_m;
   leg.short_of_goal_m = (goal.position_m - pose().position_m).norm();
@@ -374,6 +439,7 @@ hal::Task<void> Pilot::abandon() {
   looks_since_.reset();
   co_await hal::first_of(halt(), clock_.sleep_for(kHaltWait));
   if (devices_.obstacles) (void)co_await devices_.obstacles->stop();
+  profile_.reset();
   obstacles_.clear();
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "hal/clock.hpp"
+#include "hal/compute.hpp"
 #include "hal/devices.hpp"
 #include "mission/config.hpp"
 #include "mission/record.hpp"
@@ -16,6 +17,7 @@
 #include "nav/follow.hpp"
 #include "nav/localizer.hpp"
 #include "nav/obstacle_map.hpp"
+#include "nav/profile_match.hpp"
 
 namespace mission {
 
@@ -51,6 +53,11 @@ class Pilot {
 
   Pilot(const RobotConfig& config, hal::Clock& clock, hal::Devices& devices, hal::Pose2 start,
         const Eigen::Matrix3d& covariance = start_covariance());
+
+  // From now on, what looks ahead on the way is laid over these walls where satellites do not tell
+  // the place: every metre, or turn of 20 deg, and where it stands. `compute` outlives the pilot.
+  void know_walls(hal::Compute& compute, std::shared_ptr<const nav::WallMap> walls);
+  const ProfileCounts& profiles() const { return profiles_; }
 
   // Runs beside the mission and keeps the pose current, without IMU or satellites where these are
   // lost. Ends only by cancellation, or when the wheels' travel cannot be had (throws
@@ -99,6 +106,10 @@ class Pilot {
   hal::Task<void> track_imu();
   hal::Task<void> track_gnss();
   hal::Task<void> track_obstacles();
+  hal::Task<void> track_walls();
+  bool wants_walls() const;
+  bool has_good_gnss() const;
+  hal::Task<void> lay_over_walls();
   hal::Task<LegEnd> drive_on(Roads& roads, hal::Pose2 goal);
   bool is_blind() const;
   nav::Zones zones(const nav::FollowConfig& config, nav::FollowState state,
@@ -123,6 +134,12 @@ class Pilot {
   nav::ObstacleMap obstacles_;
   std::optional<hal::Time> looked_at_;  // When the last profile came.
   std::optional<hal::Time> looks_since_;
+  std::optional<hal::Profile> profile_;  // The last, until it is laid over the walls.
+  std::shared_ptr<const nav::WallMap> walls_;
+  hal::Compute* compute_ = nullptr;
+  std::optional<hal::Time> told_by_gnss_at_;
+  double laid_at_m_{}, laid_at_rad_{};  // Way travelled and heading when that was done last.
+  ProfileCounts profiles_;
   Eigen::Vector2d W_in_way_m_{0, 0};  // What ended the last route.
   std::optional<hal::Time> closed_for_now_at_;
   double travelled_m_{};  // By the wheels, since the start.

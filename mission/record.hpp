@@ -65,6 +65,8 @@ struct ScanRecord {
   double sigma_position_m{};  // Their own claim, 1-sigma.
   double sigma_heading_rad{};
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // Of (x m, y m, heading rad), in W.
+  std::optional<hal::Pose2> arrived;  // Where the localizer had a robot that came to scan here,
+  double arrived_sigma_m{}, arrived_sigma_rad{};  // and its claim, as above.
   ScanFit fit;
   hal::Time stamp{};                // Of the scan, by the robot's clock.
   std::optional<hal::Pose2> truth;  // In simulation.
@@ -85,6 +87,8 @@ struct ScanRecord {
 
   // Sets the covariance, and in two numbers what it says along its worse axis and of the heading.
   void claim(const Eigen::Matrix3d& of_pose);
+  // The same of where it arrived.
+  void arrive(const hal::Pose2& at, const Eigen::Matrix3d& of_pose);
 };
 
 // What is scanned from in place of a station that no road led to.
@@ -192,6 +196,13 @@ struct Truth {
   double before_error_max_m{}, before_error_max_rad{};
 };
 
+// Profiles laid over the walls that are known, on the way.
+struct ProfileCounts {
+  std::uint64_t used{};
+  std::uint64_t refused{};  // They were elsewhere than the localizer can be.
+  std::uint64_t unlike{};   // No walls, or others.
+};
+
 struct RunRecord {
   std::string mission;
   std::string site;
@@ -216,6 +227,7 @@ struct RunRecord {
   bool looks_through_foliage{};
   double foliage_share_min{};
   GnssCounts gnss;
+  ProfileCounts profiles;
   RegistrationCounts registration;
   double mission_s{};
   int resumed{};  // How often it went on after it had ended or been cut off.

@@ -127,6 +127,9 @@ void describe(Fields& fields, ScanRecord& of) {
   fields("covariance", of.covariance);
   fields("sigma_position_m", of.sigma_position_m);
   fields("sigma_heading_rad", of.sigma_heading_rad);
+  fields("arrived", of.arrived);
+  fields("arrived_sigma_m", of.arrived_sigma_m);
+  fields("arrived_sigma_rad", of.arrived_sigma_rad);
   fields("fit", of.fit);
   fields("stamp_ns", of.stamp);
   fields("truth", of.truth);

@@ -129,6 +129,13 @@ json::object fit_json(const ScanFit& fit) {
           {"localizer", pose_json(fit.before)}};
 }
 
+json::object arrived_json(const ScanRecord& scan) {
+  json::object object = pose_json(*scan.arrived);
+  object["sigma_position_m"] = rounded(scan.arrived_sigma_m, 4);
+  object["sigma_heading_deg"] = degrees(scan.arrived_sigma_rad);
+  return object;
+}
+
 json::object scan_json(const RunRecord& record, std::size_t index) {
   const ScanRecord& scan = record.scans[index];
   json::object object{{"number", scan.number},
@@ -149,6 +156,7 @@ json::object scan_json(const RunRecord& record, std::size_t index) {
                       {"beams", scan.beams},
                       {"points", scan.points},
                       {"points_outside_box", scan.points_outside_box}};
+  if (scan.arrived) object["arrived"] = arrived_json(scan);
   if (scan.truth) object["truth"] = pose_json(*scan.truth);
   object["seen_from"] = seen_from_json(scan);
   if (scan.next_best_view) {
@@ -233,6 +241,10 @@ json::object gnss_json(const GnssCounts& gnss) {
   return {{"fixes", gnss.fixes}, {"refused", gnss.refused}, {"resets", gnss.resets}};
 }
 
+json::object profiles_json(const ProfileCounts& profiles) {
+  return {{"used", profiles.used}, {"refused", profiles.refused}, {"unlike", profiles.unlike}};
+}
+
 json::object registration_json(const RegistrationCounts& counts) {
   return {{"accepted", counts.accepted},
           {"held_in_part", counts.held_in_part},
@@ -304,6 +316,7 @@ json::object summarise(const RunRecord& record, const ProductFacts& products) {
                        {"voxel_m", record.voxel_m},
                        {"gain_min_voxels", record.gain_min_voxels},
                        {"gnss", gnss_json(record.gnss)},
+                       {"profiles", profiles_json(record.profiles)},
                        {"registration", registration_json(record.registration)},
                        {"moving", moving_json(record.moving)},
                        {"energy", energy_json(record.energy)}};

@@ -90,6 +90,10 @@ Survey::Survey(const MissionConfig& config, const nav::SiteMap& map, SiteTasks t
       model_(std::make_unique<SiteModel>(config, map, tasks_.tasks, threads)),
       matcher_(config.localize.match_map ? std::make_unique<MapMatcher>(map, config.robot.scanner)
                                          : nullptr),
+      walls_(parts.devices.obstacles == nullptr
+                 ? std::nullopt
+                 : std::optional<WallsSoFar>(std::in_place, map, config.localize.match_map,
+                                             config.robot.obstacles.height_m)),
       registrar_(config.registration, config.robot.scanner, threads),
       energy_(config.robot.battery, config.robot.scanner.scan_s) {
   record_.mission = config.name;
@@ -169,6 +173,7 @@ hal::Task<void> Survey::survey() {
     co_await take_up();
   else
     co_await keep_plan();
+  co_await know_walls();
   bool ordered_home = false;
   try {
     co_await look_around();
@@ -240,6 +245,7 @@ void Survey::note_moving() {
 // Fixes that the localizer would not follow, and the times when it had to.
 void Survey::note_gnss() {
   record_.gnss = pilot_.gnss();
+  record_.profiles = pilot_.profiles();
   const auto& [fixes, refused, resets] = record_.gnss;
   if (refused * 100 > fixes)
     record_.notes.push_back(fmt::format(
@@ -437,6 +443,7 @@ hal::Task<bool> Survey::drive(const Stop& stop, ScanRecord& scan) {
   if (leg.drive_lost) throw CannotGoOn(fmt::format("on the way to {}: {}", stop.name, leg.reason));
   if (!leg.arrived) drop(stop, leg.reason);
   no_way_ = !leg.arrived && stop.station != nullptr;
+  scan.arrive(pilot_.pose(), pilot_.covariance());
   co_return leg.arrived;
 }
 
@@ -493,6 +500,7 @@ hal::Task<bool> Survey::acquire(const Stop& stop, ScanRecord scan) {
     const std::function<void()> work = [&] { merge(*cloud, stop, scan); };
     co_await parts_.compute.run(work);
     co_await keep_scan(stop);
+    co_await know_walls();
     co_return true;
   }
 }
@@ -578,6 +586,7 @@ ScanEffect Survey::insert(const hal::ScanCloud& cloud,
   }
   ScanEffect effect = model_->add(cloud, W_points_m, T_W_S, scan.ground_z_m);
   if (stop.view) scan.resolved_voxels = model_->settle();
+  if (walls_) walls_->add(scan.number, W_points_m, T_W_S.translation().head<2>(), scan.ground_z_m);
   close_roads(scan.number, effect);
   return effect;
 }

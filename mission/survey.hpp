@@ -27,6 +27,7 @@
 #include "mission/store.hpp"
 #include "mission/surroundings.hpp"
 #include "mission/survey_orders.hpp"
+#include "mission/walls_so_far.hpp"
 #include "planning/replacement.hpp"
 
 namespace mission {
@@ -175,6 +176,7 @@ class Survey {
                      MapSays map, bool last);
   void try_to_register(const ScanBelief& belief, ScanRecord& scan, bool other_guesses);
   void tell_localizer(const ScanRecord& scan);
+  hal::Task<void> know_walls();
   static std::string refused_note(const ScanRecord& scan);
   void note_verdict(const ScanRecord& scan, bool again);
   hal::Task<void> close_tour();
@@ -214,6 +216,7 @@ class Survey {
   Pilot pilot_;
   std::unique_ptr<SiteModel> model_;
   std::unique_ptr<MapMatcher> matcher_;  // Null: not asked for.
+  std::optional<WallsSoFar> walls_;      // Nothing: the robot does not look ahead.
   ScanRegistrar registrar_;
   ScanAttempt attempt_;                         // Of the scan that is being registered.
   std::vector<std::uint64_t> beams_checksums_;  // Of the scans kept, where keeps_beams().

@@ -177,6 +177,17 @@ void Survey::tell_localizer(const ScanRecord& scan) {
   if (done.gate == nav::Gate::rejected) ++record_.registration.unheard;
 }
 
+// What the scans show by now is what the robot holds on to on its next way.
+hal::Task<void> Survey::know_walls() {
+  if (!walls_) co_return;
+  std::shared_ptr<const nav::WallMap> walls;
+  const std::function<void()> build = [&] {
+    walls = std::make_shared<const nav::WallMap>(walls_->map());
+  };
+  co_await parts_.compute.run(build);
+  pilot_.know_walls(parts_.compute, std::move(walls));
+}
+
 std::string Survey::refused_note(const ScanRecord& scan) {
   return fmt::format("scan {} ({}) contradicts the scans that it overlaps and was not merged: {}",
                      scan.number, scan.name, scan.fit.reason);
@@ -212,6 +223,7 @@ hal::Task<void> Survey::close_tour() {
   };
   co_await parts_.compute.run(close);
   co_await keep_closing(moved);
+  if (moved) co_await know_walls();
   // Where the robot still stands at the last scan that it took, that moves it too.
   if (!moved || last_by_robot_ < 0 || pilot_.travelled_m() != last_by_robot_at_m_) co_return;
   const ScanRecord& scan = record_.scans[static_cast<std::size_t>(last_by_robot_)];
@@ -269,6 +281,7 @@ bool Survey::fit_tour() {
 void Survey::fill_anew(bool save) {
   auto anew = std::make_unique<SiteModel>(config_, map_, tasks_.tasks, threads_);
   anew->take_up(*model_);
+  if (walls_) walls_->clear();
   CloudMerger cloud;
   std::map<int, std::vector<Eigen::Vector2d>> shown_m;  // What the map lacks, by scan.
   for (ScanRecord& scan : record_.scans) {
@@ -286,6 +299,8 @@ void Survey::fill_anew(bool save) {
       const ScanEffect effect = anew->add(measured, W_points_m, T_W_S, scan.ground_z_m);
       scan.points_outside_box = effect.points_outside_box;
       shown_m[scan.number] = effect.closed_m();
+      if (walls_)
+        walls_->add(scan.number, W_points_m, T_W_S.translation().head<2>(), scan.ground_z_m);
     }
     scan.after = anew->counts();
   }
