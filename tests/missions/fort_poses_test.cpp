@@ -46,9 +46,9 @@ std::string in_words(const char* when, const Errors& errors) {
 // The fort with stations only. `regions`: what is made of those that a person scans.
 class Fort {
  public:
-  explicit Fort(const std::string& regions) {
+  explicit Fort(const std::string& regions, const std::string& robot_file = "scout_lms511.toml") {
     const auto configs = missions::configs();
-    std::string robot = missions::read_text(configs / "robots" / "scout_lms511.toml");
+    std::string robot = missions::read_text(configs / "robots" / robot_file);
     const std::string sim = "[sim]\n";
     robot.insert(robot.find(sim) + sim.size(), "gnss_outage = \"inner\"\n");
     std::ofstream(folder_.path() / "robot.toml") << robot;
@@ -64,20 +64,34 @@ class Fort {
     ASSERT_EQ(run.exit_code, 0) << "seed " << seed << ": " << run.output;
     for (const auto& scan : run.summary.at("scans").as_array()) {
       after.add(scan.at("believed"), scan.at("truth"));
-      if (!scan.at("by_hand").as_bool())
-        before.add(scan.at("registration").at("localizer"), scan.at("truth"));
+      if (scan.at("by_hand").as_bool()) continue;
+      before.add(scan.at("registration").at("localizer"), scan.at("truth"));
+      arrived.add(scan.at("arrived"), scan.at("truth"));
+      claimed_m.push_back(number(scan.at("arrived").at("sigma_position_m")));
     }
     std::filesystem::remove_all(run.folder);
   }
+  // Of a robot that holds on to walls on its way, before its scan says anything.
+  void expect_as_promised_on_arrival() const {
+    EXPECT_LE(share(arrived.position_m, 0.95), 0.30);
+    EXPECT_LE(share(arrived.heading_deg, 0.95), 1.5);
+    // What it claims along its worse axis: at most a few are more than three times as far off.
+    std::size_t beyond = 0;
+    for (std::size_t i = 0; i < claimed_m.size(); ++i)
+      beyond += arrived.position_m[i] > 3 * claimed_m[i];
+    EXPECT_LE(beyond, claimed_m.size() / 50);
+  }
   void expect_as_promised() const {
-    std::printf("%s%s", in_words("before", before).c_str(), in_words("after", after).c_str());
+    std::printf("%s%s%s", in_words("on arrival", arrived).c_str(),
+                in_words("before", before).c_str(), in_words("after", after).c_str());
     EXPECT_LE(share(before.position_m, 0.95), 0.30);
     EXPECT_LE(share(before.heading_deg, 0.95), 1.5);
     EXPECT_LE(share(after.position_m, 0.95), 0.03);
     EXPECT_LE(share(after.heading_deg, 0.95), 0.1);
   }
 
-  Errors before, after;
+  Errors arrived, before, after;
+  std::vector<double> claimed_m;  // On arrival.
 
  private:
   test::TempFolder folder_;
@@ -93,6 +107,15 @@ TEST(FortPoses, OfTheRobotAreAsPromised) {
   Fort fort("skip");
   for (int seed = 1; seed <= (nightly() ? 50 : 2); ++seed) fort.run(seed);
   EXPECT_GE(fort.before.position_m.size(), 8U);
+  fort.expect_as_promised();
+}
+
+// The same with a robot that looks ahead: the walls in sight keep its place on the way.
+TEST(FortPoses, OfARobotThatLooksAheadAreAsPromisedOnArrival) {
+  Fort fort("skip", "scout_looking.toml");
+  for (int seed = 1; seed <= (nightly() ? 50 : 2); ++seed) fort.run(seed);
+  EXPECT_GE(fort.arrived.position_m.size(), 8U);
+  fort.expect_as_promised_on_arrival();
   fort.expect_as_promised();
 }
 
