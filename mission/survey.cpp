@@ -331,16 +331,7 @@ hal::Task<void> Survey::refine() {
       continue;  // The map may show something worth seeing now.
     }
     if (views.empty()) {
-      std::string reason =
-          fmt::format("no next best view would see {} or more unseen voxels (the best sees {})",
-                      config_.phase2.gain_min_voxels, model_->best_voxels());
-      if (model_->set_aside() > 0)
-        reason +=
-            fmt::format("; {} voxels stayed unseen after two tries each", model_->set_aside());
-      if (!left_out_.empty())
-        reason +=
-            fmt::format("; {} places were left out, as no road leads there", left_out_.size());
-      co_await leave(std::move(reason), true);
+      co_await leave(why_no_view(), true);
       co_return;
     }
     const bool done = co_await take_best_of(views);
@@ -365,6 +356,7 @@ hal::Task<void> Survey::refine() {
 // The best that can be reached; those tried stay excluded, and leave the views, as do those that no
 // road leads to. False: none can.
 hal::Task<bool> Survey::take_best_of(std::vector<NextView>& views) {
+  battery_low_ = false;
   for (;;) {
     std::optional<std::size_t> chosen;
     ViewsLeftOut left_out;

@@ -192,6 +192,7 @@ class Survey {
   void bring_back();
   bool count_again();
   bool open_roads();
+  std::string why_no_view() const;
   void note_left_out();
   hal::Task<bool> take_best_of(std::vector<NextView>& views);
   hal::Task<void> leave(std::string reason, bool stopped_for_gain);

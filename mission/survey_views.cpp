@@ -117,6 +117,17 @@ bool Survey::open_roads() {
   return !left_out_.empty() && roads_[static_cast<std::size_t>(tasks_.start_area)].reopen();
 }
 
+std::string Survey::why_no_view() const {
+  std::string reason =
+      fmt::format("no next best view would see {} or more unseen voxels (the best sees {})",
+                  config_.phase2.gain_min_voxels, model_->best_voxels());
+  if (model_->set_aside() > 0)
+    reason += fmt::format("; {} voxels stayed unseen after two tries each", model_->set_aside());
+  if (!left_out_.empty())
+    reason += fmt::format("; {} places were left out, as no road leads there", left_out_.size());
+  return reason;
+}
+
 void Survey::note_left_out() {
   for (const NextView& view : left_out_)
     record_.left_out.push_back({task(view.cell.task).area.name, view.pose, view.voxels});
