@@ -15,6 +15,7 @@
 #include "mission/resume.hpp"
 #include "sim/sim_clock.hpp"
 #include "tests/dst/rig/disk.hpp"
+#include "tests/dst/rig/operator.hpp"
 #include "tests/dst/rig/wall_clock.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -155,14 +156,21 @@ class Mission {
         survey_(prepared_, 1, config(begin),
                 {io_, clock_, rig_.drivers(), run_.store, progress_, compute_, &journal_,
                  run_.past ? &*run_.past : nullptr}),
-        judge_(clock_, rig_, survey_, begin.after_cut) {}
+        judge_(clock_, rig_, survey_, begin.after_cut) {
+    if (scenario.at_console)
+      operator_ = std::make_unique<OperatorAtConsole>(
+          *scenario.at_console,
+          OperatorAtConsole::Parts{io_, clock_, compute_, survey_, rig_.drivers(), judge_},
+          begin.folder.parent_path());
+  }
 
   Outcome run();
   const Disk& disk() const { return disk_; }
   hal::Pose2 stands() { return rig_.world().robot().pose; }
 
  private:
-  static mission::GuardedSurvey::Config config(const Begin& begin);
+  mission::GuardedSurvey::Config config(const Begin& begin);
+  bool stands_for_a_person();
   std::vector<Happening> happenings();
   void add_computer(std::vector<Happening>& all);
   bool loses_power();
@@ -181,7 +189,8 @@ class Mission {
   const Scenario& scenario_;
   const Options options_;
   const Begin begin_;
-  boost::asio::io_context io_{1};
+  // All of a mission runs on one thread.
+  boost::asio::io_context io_{BOOST_ASIO_CONCURRENCY_HINT_UNSAFE};
   sim::SimClock clock_{io_};
   WallClock wall_clock_;
   Disk disk_;
@@ -194,6 +203,7 @@ class Mission {
   Rig rig_;
   mission::GuardedSurvey survey_;
   Judge judge_;
+  std::unique_ptr<OperatorAtConsole> operator_;  // Null: nobody is there.
   Outcome outcome_;
   int releases_ = 0;  // Since the robot stopped.
   int steps_ = 0;     // Since the time of the power cut.
@@ -203,6 +213,9 @@ class Mission {
 mission::GuardedSurvey::Config Mission::config(const Begin& begin) {
   mission::GuardedSurvey::Config config;
   if (begin.after_cut) config.boot = mission::Boot::power_cut;
+  config.watch.tell = [this](const std::string& what) {
+    if (operator_) operator_->tell(what);
+  };
   return config;
 }
 
@@ -265,12 +278,18 @@ hal::Task<void> Mission::fate() {
   }
 }
 
+// Stopped, or told to stand by somebody at the console.
+bool Mission::stands_for_a_person() {
+  const mission::GatedDrive& gate = survey_.gate();
+  return gate.mode() == mission::Mode::stopped || (operator_ && gate.begun() && !gate.released());
+}
+
 // Releases the robot when it has been standing stopped for a while and nothing is pressed any more.
 hal::Task<void> Mission::person() {
   hal::Time since = clock_.now();
   for (;;) {
     co_await clock_.sleep_for(kPersonLooks);
-    const bool stopped = survey_.gate().mode() == mission::Mode::stopped;
+    const bool stopped = stands_for_a_person();
     if (!stopped) releases_ = 0;
     if (!stopped || rig_.pressed()) since = clock_.now();
     if (clock_.now() - since < scenario_.releases_after) continue;
@@ -333,6 +352,7 @@ void Mission::run_to_the_end() {
   boost::asio::co_spawn(io_, rig_.units().run(), rethrow);
   survey_.start();
   boost::asio::co_spawn(io_, person(), rethrow);
+  if (operator_) operator_->begin();
   if (options_.observe) boost::asio::co_spawn(io_, observe(), rethrow);
   if (options_.each_minute) boost::asio::co_spawn(io_, tell_minutes(), rethrow);
   const hal::Time late(options_.ends_within);
@@ -355,6 +375,7 @@ Outcome Mission::outcome() {
   outcome_.decisions_hash = hash_of(begin_.folder / "decisions.jsonl");
   outcome_.decisions = last_lines(begin_.folder / "decisions.jsonl");
   outcome_.frames_hash = judge_.frames_hash();
+  if (operator_) outcome_.console_hash = operator_->hash();
   outcome_.stops = judge_.stops();
   outcome_.slowest_stop = judge_.slowest_stop();
   if (!outcome_.violation) outcome_.violation = judge_.violation();
@@ -413,6 +434,7 @@ void add(Outcome& sum, const Outcome& next) {
   sum.decisions_hash ^= first.decisions_hash * 3;
   sum.frames_hash ^= first.frames_hash * 3;
   sum.journal_hash ^= first.journal_hash * 3;
+  sum.console_hash ^= first.console_hash * 3;
   sum.named.insert(first.named.begin(), first.named.end());
   sum.held |= first.held;
   sum.resumed = first.resumed + 1;
