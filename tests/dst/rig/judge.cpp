@@ -94,6 +94,11 @@ void Judge::on_motion(const agilex::MotionCommand& told) {
   if (survey_.gate().mode() == mission::Mode::teleop && now - key_at_ > kDeadManMax)
     violated("the robot stands when the dead-man key is let go",
              fmt::format("{}; the last key is {:.3f} s old", what, hal::seconds(now - key_at_)));
+  if (survey_.gate().mode() == mission::Mode::autonomous && disk_failed_at_ &&
+      now - *disk_failed_at_ > kStopMax)
+    violated(
+        "a mission whose disk fails stands",
+        fmt::format("{}; it has failed for {:.3f} s", what, hal::seconds(now - *disk_failed_at_)));
   if (creeps(told))
     crept_at_ = now;
   else
@@ -210,7 +215,7 @@ void Judge::look() {
   const hal::DriveStatus status = rig_.drivers().drive().status();
   reported_at_ = status.reported_at;
   const bool waits = survey_.survey().orders().waits();
-  if (!may_move_ || waits || !survey_.watch().well()) stood_ += now - looked_at_;
+  if (!may_move_ || waits || disk_failed_at_ || !survey_.watch().well()) stood_ += now - looked_at_;
   looked_at_ = now;
   look_at_causes(status);
   if (rig_.is_cut("drive")) {  // Nothing gets through: the base's own time-out has to do.
@@ -220,6 +225,9 @@ void Judge::look() {
   if (measuring_ && now - *stopped_at_ > kStopMax)
     violated("a zero command within one gate period and a frame of every cause to stop",
              fmt::format("{}: none after {:.3f} s", cause_, hal::seconds(now - *stopped_at_)));
+  const bool disk_failed = survey_.survey().disk_fault().has_value();
+  if (disk_failed != disk_failed_at_.has_value())
+    disk_failed_at_ = disk_failed ? std::optional(now) : std::nullopt;
   look_at_presses();
   look_at_console();
   look_at_world();

@@ -83,6 +83,7 @@ class Judge {
   std::optional<hal::Time> board_pressed_at_, safety_pressed_at_;
   int stops_ = 0, collisions_ = 0;
   bool password_typed_ = false;
+  std::optional<hal::Time> disk_failed_at_;   // It fails just now.
   std::optional<hal::Time> stop_ordered_at_;  // The zero frame after it is awaited.
   hal::Time key_at_{-std::chrono::hours(1)}, driven_by_hand_at_ = key_at_;
   hal::Duration slowest_stop_{}, stood_{};

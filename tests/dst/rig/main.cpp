@@ -31,7 +31,8 @@ void tell(const dst::Outcome& outcome) {
              outcome.scans, outcome.driven_m, hal::seconds(outcome.virtual_time), outcome.cpu_s,
              outcome.end);
   fmt::print(
-      "  trace: decisions {:016x}, frames {:016x}, journal {:016x}, console {:016x}; gone on with {} "
+      "  trace: decisions {:016x}, frames {:016x}, journal {:016x}, console {:016x}; gone on with "
+      "{} "
       "times\n",
       outcome.decisions_hash, outcome.frames_hash, outcome.journal_hash, outcome.console_hash,
       outcome.resumed);

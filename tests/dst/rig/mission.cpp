@@ -413,14 +413,26 @@ struct Left {
   hal::Pose2 stands;
 };
 
+// Scans that count, and would be gone with the power.
+std::optional<Violation> not_durable(const Disk& disk, const fs::path& flushed,
+                                     const Outcome& outcome) {
+  disk.copy_flushed(flushed);
+  const std::size_t safe = scans_in(flushed).size();
+  if (safe == outcome.scans) return std::nullopt;
+  return Violation{hal::Time(outcome.virtual_time), "no scan counts that is not durable",
+                   fmt::format("{} count, {} are flushed", outcome.scans, safe)};
+}
+
 Left run_leg(const support::RandomYard& yard, const Scenario& scenario, const Options& options,
              const Begin& begin) {
   Mission mission(yard, scenario, options, begin);
-  const Outcome outcome = mission.run();
+  Outcome outcome = mission.run();
   if (!begin.after_cut && outcome.end.starts_with("F70")) {  // The disk ended it.
     mission.disk().copy_flushed(begin.flushed);
     mission.disk().copy(begin.next);
   }
+  if (outcome.completed && scenario.disk && !outcome.violation)
+    outcome.violation = not_durable(mission.disk(), begin.flushed, outcome);
   return {outcome, mission.stands()};
 }
 
@@ -456,11 +468,11 @@ std::string lost_or_repeated(const fs::path& run, const std::vector<std::uint64_
   return "";
 }
 
-// A person goes on where power or disk ended it, with devices that are well and a disk that is.
+// A person goes on where power or disk ended it, with devices that are well and a disk that is. The
+// power may be cut once more.
 void go_on(const support::RandomYard& yard, const Scenario& scenario, const Options& options,
-           const fs::path& folder, const Left& left, Outcome& outcome) {
-  const fs::path next = folder / "next", flushed = folder / "flushed";
-  const std::vector<std::uint64_t> safe = scans_in(flushed), there = scans_in(next);
+           const Begin& before, const Left& left, Outcome& outcome) {
+  const std::vector<std::uint64_t> safe = scans_in(before.flushed), there = scans_in(before.next);
   if (!begins_with(there, safe)) {
     outcome.violation = {hal::Time(outcome.virtual_time), "every acknowledged scan is kept",
                          fmt::format("{} of {} are there", there.size(), safe.size())};
@@ -470,7 +482,14 @@ void go_on(const support::RandomYard& yard, const Scenario& scenario, const Opti
   well.seed = scenario.seed;
   well.releases_after = scenario.releases_after;
   well.by_button = scenario.by_button;
-  const Begin begin{left.stands, there.empty() ? folder / "anew" : next, true, !there.empty()};
+  well.power_cut = scenario.cut_again;
+  const auto again = [](fs::path path) { return path += "+"; };
+  const Begin begin{left.stands,
+                    there.empty() ? again(before.folder) : before.next,
+                    true,
+                    !there.empty(),
+                    again(before.flushed),
+                    again(before.next)};
   const Left second = run_leg(yard, well, options, begin);
   add(outcome, second.outcome);
   outcome.journal_hash ^= hash_of(events_in(begin.folder));
@@ -478,6 +497,8 @@ void go_on(const support::RandomYard& yard, const Scenario& scenario, const Opti
       !wrong.empty() && !outcome.violation)
     outcome.violation = {hal::Time(outcome.virtual_time),
                          "every acknowledged scan is kept, and none is taken again", wrong};
+  if (!outcome.violation && fs::exists(begin.next))
+    go_on(yard, well, options, begin, second, outcome);
 }
 
 }  // namespace
@@ -494,7 +515,7 @@ Outcome run_mission(const support::RandomYard& yard, const Scenario& scenario,
   outcome.journal_hash = hash_of(events_in(begin.folder));
   if (outcome.violation || !fs::exists(begin.next)) return outcome;
   try {
-    go_on(yard, scenario, options, folder.path(), left, outcome);
+    go_on(yard, scenario, options, begin, left, outcome);
   } catch (const std::exception& error) {
     outcome.violation = {hal::Time(outcome.virtual_time), "a run that was cut can be gone on with",
                          error.what()};

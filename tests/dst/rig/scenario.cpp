@@ -100,6 +100,8 @@ void draw_computer(Dice& dice, Scenario& scenario) {
     scenario.disk =
         DiskTrouble{static_cast<DiskFault>(dice.below(4)), draw_time(dice), draw_during(dice)};
   if (dice.below(3) == 0) scenario.power_cut = PowerCut{draw_time(dice), dice.below(200)};
+  if (scenario.power_cut && dice.below(2) == 0)
+    scenario.cut_again = PowerCut{hal::from_seconds(dice.uniform(0, 90)), dice.below(200)};
 }
 
 // As one would write it down.
@@ -135,6 +137,7 @@ Scenario draw_scenario(std::uint64_t seed) {
                     .clock_jumps = {},
                     .disk = {},
                     .power_cut = {},
+                    .cut_again = {},
                     .at_console = {},
                     .releases_after = hal::from_seconds(dice.uniform(1, 60)),
                     .by_button = dice.below(2) == 0};
@@ -189,6 +192,11 @@ std::string text(const Scenario& scenario) {
   if (const auto& cut = scenario.power_cut)
     lines.emplace(cut->from, fmt::format("  {:8.3f} s  and {} steps: the power is cut\n",
                                          hal::seconds(cut->from), cut->steps));
+  if (const auto& cut = scenario.cut_again)
+    lines.emplace(
+        kForEver,
+        fmt::format("  {:8.3f} s  and {} steps after it is gone on with: it is cut again\n",
+                    hal::seconds(cut->from), cut->steps));
   if (const auto& who = scenario.at_console) {
     for (const Operator::Typed& typed : who->typed)
       lines.emplace(typed.at, fmt::format("  {:8.3f} s  typed: {}\n", hal::seconds(typed.at),

@@ -89,7 +89,7 @@ struct Scenario {
   std::vector<DateJump> jumps;
   std::vector<ClockJump> clock_jumps;
   std::optional<DiskTrouble> disk;
-  std::optional<PowerCut> power_cut;
+  std::optional<PowerCut> power_cut, cut_again;  // Again: from when the run was gone on with.
   std::optional<Operator> at_console;
   hal::Duration releases_after{};  // A person releases a robot that has been stopped for so long,
   bool by_button{};                // by the board's button, or as the console does.
