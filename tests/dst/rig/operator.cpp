@@ -21,7 +21,7 @@ constexpr hal::Duration kReads = 100ms;
 // Long after whatever was typed somebody sees to it that the mission goes on.
 constexpr hal::Duration kHelpsAfter = 20s, kHelpsAgain = 30s;
 
-void rethrow(std::exception_ptr error) {
+void pass_on(std::exception_ptr error) {
   if (error) std::rethrow_exception(error);
 }
 
@@ -204,10 +204,10 @@ std::uint64_t OperatorAtConsole::hash() const {
 }
 
 void OperatorAtConsole::begin() {
-  boost::asio::co_spawn(parts_.io, types(), rethrow);
-  boost::asio::co_spawn(parts_.io, line(), rethrow);
-  boost::asio::co_spawn(parts_.io, reads(), rethrow);
-  boost::asio::co_spawn(parts_.io, helps(), rethrow);
+  boost::asio::co_spawn(parts_.io, types(), pass_on);
+  boost::asio::co_spawn(parts_.io, line(), pass_on);
+  boost::asio::co_spawn(parts_.io, reads(), pass_on);
+  boost::asio::co_spawn(parts_.io, helps(), pass_on);
 }
 
 void OperatorAtConsole::type(const std::string& bytes) {
