@@ -180,11 +180,11 @@ FileResult<std::vector<JournalEvent>> JournalFile::read() const {
 
 hal::Task<void> Journal::run() {
   for (;;) {
-    while (waiting_.empty()) co_await came_.wait();
-    const hal::Time next = clock_.now() + kPause;
+    while (waiting_.empty() && again_.empty()) co_await came_.wait();
+    const hal::Time began = clock_.now();
     co_await write(taken());
     went_.notify();
-    co_await clock_.sleep_until(next);
+    co_await clock_.sleep_until(began + (trouble_ ? kAgain : kPause));
   }
 }
 
@@ -201,21 +201,22 @@ hal::Task<void> Journal::write(std::deque<std::shared_ptr<Waiting>> batch) {
   const auto work = [&] { outcome = file_.append(events); };
   co_await compute_.run(work);
   ++commits_;
+  if (!outcome) {
+    trouble_ = outcome.error();
+    again_ = std::move(batch);
+    co_return;
+  }
+  trouble_.reset();
   for (std::size_t i = 0; i < batch.size(); ++i) {
+    batch[i]->event.number = events[i].number;
     batch[i]->done = true;
-    if (!outcome && batch[i]->told && again_.size() < kToldMax) again_.push_back(batch[i]);
-    if (outcome)
-      batch[i]->outcome = events[i].number;
-    else
-      batch[i]->outcome = outcome.error();
   }
 }
 
 void Journal::tell(std::string kind, std::string text) {
-  if (waiting_.size() >= kToldMax) return;
+  if (waiting_.size() + again_.size() >= kToldMax) return;
   const auto mine = std::make_shared<Waiting>();
   mine->event = {0, clock_.now(), std::move(kind), std::move(text)};
-  mine->told = true;
   waiting_.push_back(mine);
   came_.notify();
 }
@@ -228,14 +229,14 @@ FileResult<void> Journal::append_now(std::string kind, std::string text) {
   return file_.append(events);
 }
 
-hal::Task<FileResult<std::int64_t>> Journal::append(std::string kind, std::string text) {
+hal::Task<std::int64_t> Journal::append(std::string kind, std::string text) {
   while (waiting_.size() >= kWaitingMax) co_await went_.wait();
   const auto mine = std::make_shared<Waiting>();
   mine->event = {0, clock_.now(), std::move(kind), std::move(text)};
   waiting_.push_back(mine);
   came_.notify();
   while (!mine->done) co_await went_.wait();
-  co_return mine->outcome;
+  co_return mine->event.number;
 }
 
 }  // namespace mission

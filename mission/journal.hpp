@@ -5,6 +5,7 @@
 #include <deque>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -61,7 +62,8 @@ class JournalFile {
 class Journal {
  public:
   static constexpr hal::Duration kPause = std::chrono::milliseconds(50);
-  static constexpr std::size_t kWaitingMax = 256;  // More wait for their turn.
+  static constexpr hal::Duration kAgain = std::chrono::seconds(1);  // After a failure.
+  static constexpr std::size_t kWaitingMax = 256;                   // More wait for their turn.
 
   // Clock and compute must outlive it.
   Journal(JournalFile file, hal::Clock& clock, hal::Compute& compute)
@@ -69,11 +71,12 @@ class Journal {
 
   hal::Task<void> run();  // Ends only by cancellation.
 
-  // Its number, once it is durable; or why it is not, and then it does not count. Needs run().
-  hal::Task<FileResult<std::int64_t>> append(std::string kind, std::string text);
+  // Its number, once it is durable: what could not be written is tried again, in its order, until
+  // it is. Needs run().
+  hal::Task<std::int64_t> append(std::string kind, std::string text);
 
   // The same for what nobody waits for: with the next commit, before whatever comes after it. Of
-  // more than kToldMax that wait the newest is lost. What could not be written is tried again.
+  // more than kToldMax that wait the newest is lost.
   void tell(std::string kind, std::string text);
   static constexpr std::size_t kToldMax = 4096;
 
@@ -81,13 +84,13 @@ class Journal {
   FileResult<void> append_now(std::string kind, std::string text);
 
   std::int64_t commits() const { return commits_; }
+  // Why the latest commit failed; nothing: it did not.
+  const std::optional<FileError>& trouble() const { return trouble_; }
 
  private:
   struct Waiting {
     JournalEvent event;
-    FileResult<std::int64_t> outcome{0};
-    bool told = false;  // Nobody waits for it.
-    bool done = false;
+    bool done = false;  // And has its number.
   };
   std::deque<std::shared_ptr<Waiting>> taken();
   hal::Task<void> write(std::deque<std::shared_ptr<Waiting>> batch);
@@ -96,8 +99,9 @@ class Journal {
   hal::Clock& clock_;
   hal::Compute& compute_;
   std::deque<std::shared_ptr<Waiting>> waiting_;
-  std::deque<std::shared_ptr<Waiting>> again_;  // Told, and could not be written: goes first.
+  std::deque<std::shared_ptr<Waiting>> again_;  // Could not be written: goes first.
   hal::Wake came_, went_;
+  std::optional<FileError> trouble_;
   std::int64_t commits_ = 0;
 };
 

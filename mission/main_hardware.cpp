@@ -114,7 +114,9 @@ GuardedSurvey::GuardedSurvey(const Prepared& prepared, int threads, Config confi
                parts.past, parts.skip}) {
   gate_.watch_surroundings([this] {
     Surroundings around = survey_.surroundings();
-    around.hold_fault = watch_.hold_fault();
+    for (const auto fault : {watch_.hold_fault(), survey_.disk_fault()})
+      if (fault && (!around.hold_fault || outweighs(*fault, *around.hold_fault)))
+        around.hold_fault = fault;
     return around;
   });
 }

@@ -137,6 +137,7 @@ FileResult<void> RunStore::cut_decisions() {
   const auto text = read_file(folder_ / kDecisions);
   if (!text) return text.error();
   const std::size_t whole = text->rfind('\n') + 1;  // 0 where there is none.
+  decided_bytes_ = static_cast<std::int64_t>(whole);
   if (whole == text->size()) return {};
   if (file_calls().ftruncate(decisions_fd_, static_cast<std::int64_t>(whole)) != 0)
     return failed(folder_ / kDecisions, "shorten");
@@ -146,11 +147,17 @@ FileResult<void> RunStore::cut_decisions() {
 RunStore::RunStore(RunStore&& other) noexcept
     : folder_(std::move(other.folder_)),
       decisions_fd_(std::exchange(other.decisions_fd_, -1)),
+      undecided_(std::move(other.undecided_)),
+      decided_bytes_(other.decided_bytes_),
+      torn_(other.torn_),
       replaced_(other.replaced_) {}
 
 RunStore& RunStore::operator=(RunStore&& other) noexcept {
   std::swap(folder_, other.folder_);
   std::swap(decisions_fd_, other.decisions_fd_);
+  std::swap(undecided_, other.undecided_);
+  std::swap(decided_bytes_, other.decided_bytes_);
+  std::swap(torn_, other.torn_);
   std::swap(replaced_, other.replaced_);
   return *this;
 }
@@ -168,8 +175,19 @@ fs::path RunStore::beams_path(int number) const {
 }
 
 FileResult<void> RunStore::decide(const boost::json::object& decision) {
-  if (!write_fully(decisions_fd_, json_line(decision) + "\n"))
-    return failed(folder_ / kDecisions, "write");
+  const std::string line = json_line(decision) + "\n";
+  if (undecided_.size() + line.size() <= kUndecidedMax) undecided_ += line;
+  return write_decisions();
+}
+
+FileResult<void> RunStore::write_decisions() {
+  if (undecided_.empty()) return {};
+  if (torn_ && file_calls().ftruncate(decisions_fd_, decided_bytes_) != 0)
+    return failed(folder_ / kDecisions, "shorten");
+  torn_ = !write_fully(decisions_fd_, undecided_);
+  if (torn_) return failed(folder_ / kDecisions, "write");
+  decided_bytes_ += static_cast<std::int64_t>(undecided_.size());
+  undecided_.clear();
   return {};
 }
 

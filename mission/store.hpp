@@ -50,8 +50,13 @@ class RunStore {
   static constexpr const char* kJournalName = "journal.sqlite";
   std::filesystem::path report_path() const { return folder_ / "report.html"; }
 
-  // Appends one line to decisions.jsonl; keys stay in the order given.
+  // Appends one line to decisions.jsonl; keys stay in the order given. A line that the disk does
+  // not take is kept, and goes before the next one, or when write_decisions() is called; of more
+  // than kUndecidedMax bytes the newest lines are lost.
   FileResult<void> decide(const boost::json::object& decision);
+  FileResult<void> write_decisions();
+  bool all_decided() const { return undecided_.empty(); }
+  static constexpr std::size_t kUndecidedMax = 1 << 20;
 
   FileResult<void> save_scan(const std::vector<Eigen::Vector3f>& W_points_m,
                              const Eigen::Isometry3d& T_W_S, const ScanInfo& info);
@@ -80,6 +85,9 @@ class RunStore {
 
   std::filesystem::path folder_;
   int decisions_fd_ = -1;
+  std::string undecided_;           // Lines that are not in the file,
+  std::int64_t decided_bytes_ = 0;  // and how long it is without
+  bool torn_ = false;               // a part of them that may be in it.
   bool replaced_ = false;
 };
 

@@ -134,7 +134,6 @@ hal::Task<void> Survey::run() {
   orders_.end();
   note_given();
   record_.mission_s = now_s();
-  over_ = failure != nullptr;
   note_sensors();
   note_gnss();
   note_registration();
@@ -159,12 +158,13 @@ void Survey::note_end() {
   keep_end();
 }
 
-// What lives with the survey: the pilot keeps the pose, and the journal is written.
+// What lives with the survey: the pilot keeps the pose, the journal is written, and the disk is
+// looked after.
 hal::Task<void> Survey::beside() {
   std::vector<hal::Task<void>> all;
   all.push_back(pilot_.track());
   if (parts_.journal != nullptr) all.push_back(parts_.journal->run());
-  co_await hal::together(std::move(all));
+  co_await hal::first_of(watch_disk(), hal::together(std::move(all)));
 }
 
 hal::Task<void> Survey::survey() {
@@ -466,7 +466,11 @@ hal::Task<bool> Survey::carry(const Stop& stop, ScanRecord& scan) {
 hal::Task<bool> Survey::acquire(const Stop& stop, ScanRecord scan) {
   scan.number = static_cast<int>(record_.scans.size()) + 1;
   scan.start_s = now_s();
-  parts_.store.has_room(kScansOfRoom * scan_bytes(config_.robot.scanner)).value();
+  co_await until_decided();
+  const std::function<void()> look_for_room = [this] {
+    parts_.store.has_room(kScansOfRoom * scan_bytes(config_.robot.scanner)).value();
+  };
+  co_await until_written(look_for_room);
   const int takes = config_.registration.scans && config_.registration.retake ? 2 : 1;
   for (int take = 1;; ++take) {
     const double began_s = now_s();
@@ -489,7 +493,9 @@ hal::Task<bool> Survey::acquire(const Stop& stop, ScanRecord scan) {
     note_verdict(scan, again);
     if (again) continue;
     tell_localizer(scan);
-    const std::function<void()> work = [&] { merge(*cloud, stop, scan); };
+    Saved saved;
+    co_await save(*cloud, scan, saved);
+    const std::function<void()> work = [&] { merge(*cloud, saved, stop, scan); };
     co_await parts_.compute.run(work);
     co_await keep_scan(stop);
     co_await know_walls();
@@ -521,15 +527,25 @@ hal::Task<std::optional<hal::ScanCloud>> Survey::take_scan(const Stop& stop) {
   co_return std::nullopt;
 }
 
+// Durable before it counts: what was measured, and its points.
+hal::Task<void> Survey::save(const hal::ScanCloud& cloud, const ScanRecord& scan, Saved& saved) {
+  const std::function<void()> work = [&] {
+    const Eigen::Isometry3d T_W_S =
+        scanner_pose(scan.believed, scan.ground_z_m, config_.robot.scanner.height_m);
+    saved.W_points_m = scan_points(cloud, T_W_S);
+    if (keeps_beams()) saved.beams_checksum = parts_.store.save_beams(scan.number, cloud).value();
+    save_points(scan, saved.W_points_m, T_W_S);
+  };
+  co_await until_written(work);
+}
+
 // A scan that contradicts the others is kept, and not merged: what it alone saw stays unseen.
-void Survey::merge(const hal::ScanCloud& cloud, const Stop& stop, ScanRecord& scan) {
+void Survey::merge(const hal::ScanCloud& cloud, const Saved& saved, const Stop& stop,
+                   ScanRecord& scan) {
   const Eigen::Isometry3d T_W_S =
       scanner_pose(scan.believed, scan.ground_z_m, config_.robot.scanner.height_m);
-  const std::vector<Eigen::Vector3f> W_points_m = scan_points(cloud, T_W_S);
-  // Durable before it counts.
-  if (keeps_beams())
-    beams_checksums_.push_back(parts_.store.save_beams(scan.number, cloud).value());
-  save_points(scan, W_points_m, T_W_S);
+  const std::vector<Eigen::Vector3f>& W_points_m = saved.W_points_m;
+  if (keeps_beams()) beams_checksums_.push_back(saved.beams_checksum);
   ScanEffect effect;
   if (scan.fit.verdict != ScanVerdict::refused)
     effect = insert(cloud, W_points_m, T_W_S, stop, scan);
@@ -599,9 +615,9 @@ void Survey::drop(const Stop& stop, const std::string& reason) {
   tell_drop(stop);
 }
 
+// What the disk does not take now is written before the next step: see until_decided().
 void Survey::decide(const json::object& decision) {
-  const auto decided = parts_.store.decide(decision);
-  if (!decided && !over_) throw FileFailure(decided.error());
+  (void)parts_.store.decide(decision);
 }
 
 void Survey::show(const Stop& stop) {

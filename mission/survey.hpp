@@ -14,6 +14,7 @@
 #include "hal/compute.hpp"
 #include "hal/devices.hpp"
 #include "mission/config.hpp"
+#include "mission/disk_watch.hpp"
 #include "mission/energy.hpp"
 #include "mission/map_match.hpp"
 #include "mission/pilot.hpp"
@@ -77,6 +78,9 @@ class Survey {
   const Pilot& pilot() const { return pilot_; }
   // For the gate; does not allocate.
   Surroundings surroundings();
+  // Why the disk does not take what has to be kept; the robot is to stand then. Nothing: it does.
+  // Does not allocate.
+  std::optional<FaultCode> disk_fault() const { return disk_.fault(); }
   const std::optional<Progress>& shown() const { return shown_; }  // The latest; nothing: none yet.
 
  private:
@@ -113,6 +117,12 @@ class Survey {
   RunPlanned planned() const;
   SoFar so_far() const;
   Whereabouts whereabouts() const;
+  // In survey_disk.cpp.
+  hal::Task<void> until_written(std::function<void()> work);
+  hal::Task<void> until_decided();
+  hal::Task<void> watch_disk();
+  void note_disk(DiskWatch::Part part, const FileError* why);
+  void say_disk(const std::string& what);
   // In survey_resume.cpp.
   hal::Task<void> take_up();
   void redo();
@@ -161,7 +171,13 @@ class Survey {
   hal::Task<bool> carry(const Stop& stop, ScanRecord& scan);
   hal::Task<bool> acquire(const Stop& stop, ScanRecord scan);
   hal::Task<std::optional<hal::ScanCloud>> take_scan(const Stop& stop);
-  void merge(const hal::ScanCloud& cloud, const Stop& stop, ScanRecord& scan);
+  // What is on the disk of a scan.
+  struct Saved {
+    std::uint64_t beams_checksum{};
+    std::vector<Eigen::Vector3f> W_points_m;
+  };
+  hal::Task<void> save(const hal::ScanCloud& cloud, const ScanRecord& scan, Saved& saved);
+  void merge(const hal::ScanCloud& cloud, const Saved& saved, const Stop& stop, ScanRecord& scan);
   void save_points(const ScanRecord& scan, const std::vector<Eigen::Vector3f>& W_points_m,
                    const Eigen::Isometry3d& T_W_S);
   ScanEffect insert(const hal::ScanCloud& cloud, const std::vector<Eigen::Vector3f>& W_points_m,
@@ -213,7 +229,7 @@ class Survey {
   double before_s_{};  // Mission time of what went before, when it goes on with a run.
   std::string stop_reason_;
   SurveyOrders orders_;
-  bool over_ = false;  // Ended early: the disk may be why.
+  DiskWatch disk_;
   Pilot pilot_;
   std::unique_ptr<SiteModel> model_;
   std::unique_ptr<MapMatcher> matcher_;  // Null: not asked for.

@@ -25,6 +25,7 @@ constexpr const char* kSkipped = "left out by the operator";
 // dropped, with the reason on record, or put off.
 hal::Task<bool> Survey::visit(const Stop& stop) {
   for (;;) {
+    co_await until_decided();
     co_await obey();
     if (orders_.take_skip()) {
       drop(stop, kSkipped);

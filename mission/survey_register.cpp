@@ -217,11 +217,10 @@ hal::Task<void> Survey::close_tour() {
   const bool nothing_new = std::exchange(scans_closed_, scans) == scans;
   if (!config_.registration.scans || !config_.registration.tour_end || nothing_new) co_return;
   bool moved = false;
-  const std::function<void()> close = [&] {
-    moved = fit_tour();
-    if (moved) fill_anew(true);
-  };
+  const std::function<void()> close = [&] { moved = fit_tour(); };
   co_await parts_.compute.run(close);
+  const std::function<void()> fill = [this] { fill_anew(true); };
+  if (moved) co_await until_written(fill);
   co_await keep_closing(moved);
   if (moved) co_await know_walls();
   // Where the robot still stands at the last scan that it took, that moves it too.

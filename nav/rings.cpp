@@ -60,26 +60,32 @@ void add_contacts(const std::vector<SegmentMm>& edges, int i, int j, std::vector
 template <class Visit>
 void for_overlapping(const std::vector<Box>& boxes, Visit visit) {
   constexpr std::size_t kBoxesPerBand = 16, kBandsMax = 256;
+  struct Entry {
+    Box box;
+    int index, lowest_band;
+  };
   if (boxes.empty()) return;
   std::int64_t low = boxes.front().y0, high = boxes.front().y1;
   for (const Box& box : boxes) low = std::min(low, box.y0), high = std::max(high, box.y1);
   const std::size_t count = std::clamp<std::size_t>(boxes.size() / kBoxesPerBand, 1, kBandsMax);
   const std::int64_t height = (high - low) / static_cast<std::int64_t>(count) + 1;
-  const auto band_of = [&](std::int64_t y) { return static_cast<std::size_t>((y - low) / height); };
-  std::vector<std::vector<int>> bands(count);
-  for (std::size_t k = 0; k < boxes.size(); ++k)
-    for (std::size_t band = band_of(boxes[k].y0); band <= band_of(boxes[k].y1); ++band)
-      bands[band].push_back(static_cast<int>(k));
-  for (std::size_t band = 0; band < count; ++band)
-    for (std::size_t m = 0; m < bands[band].size(); ++m) {
-      const Box& mine = boxes[bands[band][m]];
-      for (std::size_t n = m + 1; n < bands[band].size(); ++n) {
-        const Box& other = boxes[bands[band][n]];
-        if (other.x0 > mine.x1) break;
-        if (other.y0 > mine.y1 || other.y1 < mine.y0) continue;
-        if (band_of(std::max(mine.y0, other.y0)) == band) visit(bands[band][m], bands[band][n]);
+  const auto band_of = [&](std::int64_t y) { return static_cast<int>((y - low) / height); };
+  std::vector<std::vector<Entry>> bands(count);
+  for (int k = 0; k < static_cast<int>(boxes.size()); ++k) {
+    const Entry entry{boxes[k], k, band_of(boxes[k].y0)};
+    const int highest_band = band_of(boxes[k].y1);
+    for (int band = entry.lowest_band; band <= highest_band; ++band) bands[band].push_back(entry);
+  }
+  for (int band = 0; band < static_cast<int>(count); ++band) {
+    const Entry* const end = bands[band].data() + bands[band].size();
+    for (const Entry* mine = bands[band].data(); mine != end; ++mine)
+      for (const Entry* other = mine + 1; other != end; ++other) {
+        if (other->box.x0 > mine->box.x1) break;
+        if (other->box.y0 > mine->box.y1 || other->box.y1 < mine->box.y0) continue;
+        if (std::max(mine->lowest_band, other->lowest_band) == band)
+          visit(mine->index, other->index);
       }
-    }
+  }
 }
 
 // Contacts of which at least one edge is `of_these`; empty: of any. In the order of the edges'

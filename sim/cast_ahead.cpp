@@ -62,18 +62,11 @@ std::span<const float> CastAhead::of(std::uint64_t number, std::uint64_t every) 
 // People walk on while what stands was cast: they are put in as they are now.
 std::span<const float> CastAhead::with_people(const MirrorTurn& turn,
                                               std::span<const float> ranges_m) {
-  const Eigen::Isometry3d T_W_S = key_->at.T_W_S(world_.config().scanner.height_m);
   among_people_m_.assign(ranges_m.begin(), ranges_m.end());
-  std::optional<double> panned_rad;
-  Eigen::Isometry3d T_W_L;
+  to_people_m_.resize(arc_.beams);
+  look_for_people(turn);
   for (std::uint32_t i = 0; i < arc_.beams; ++i) {
-    const double pan_rad =
-        turn.pan_first_rad + (turn.pan_end_rad - turn.pan_first_rad) * i / arc_.beams;
-    if (panned_rad != pan_rad)  // Most turns are of a pan axis that stands, or of none.
-      T_W_L = T_W_S * Eigen::AngleAxisd(pan_rad, Eigen::Vector3d::UnitZ()) * config_.T_P_L;
-    panned_rad = pan_rad;
-    const Eigen::Vector3d W_direction = T_W_L.linear() * L_directions_[i];
-    const double range_m = world_.range_to_people_m(T_W_L.translation(), W_direction);
+    const double range_m = to_people_m_[i];
     const bool seen =
         range_m >= config_.ranges.range_min_m && range_m <= config_.ranges.range_max_m;
     float& reported_m = among_people_m_[i];
@@ -81,6 +74,23 @@ std::span<const float> CastAhead::with_people(const MirrorTurn& turn,
       reported_m = static_cast<float>(range_m);
   }
   return among_people_m_;
+}
+
+// All beams whose pan angle is the same at once: mostly all of a turn.
+void CastAhead::look_for_people(const MirrorTurn& turn) {
+  const Eigen::Isometry3d T_W_S = key_->at.T_W_S(world_.config().scanner.height_m);
+  const auto pan_rad = [&](std::uint32_t beam) {
+    return turn.pan_first_rad + (turn.pan_end_rad - turn.pan_first_rad) * beam / arc_.beams;
+  };
+  for (std::uint32_t first = 0, end = 0; first < arc_.beams; first = end) {
+    const Eigen::Isometry3d T_W_L =
+        T_W_S * Eigen::AngleAxisd(pan_rad(first), Eigen::Vector3d::UnitZ()) * config_.T_P_L;
+    W_directions_.clear();
+    for (; end < arc_.beams && pan_rad(end) == pan_rad(first); ++end)
+      W_directions_.emplace_back(T_W_L.linear() * L_directions_[end]);
+    world_.ranges_to_people_m(T_W_L.translation(), W_directions_,
+                              std::span(to_people_m_).subspan(first, end - first));
+  }
 }
 
 void CastAhead::cast(std::uint64_t number) {

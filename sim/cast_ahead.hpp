@@ -46,6 +46,7 @@ class CastAhead {
   bool has(std::uint64_t number, std::uint64_t every) const;
   void cast(std::uint64_t number);
   std::span<const float> with_people(const MirrorTurn& turn, std::span<const float> ranges_m);
+  void look_for_people(const MirrorTurn& turn);
 
   const Config config_;
   World& world_;
@@ -59,6 +60,8 @@ class CastAhead {
   std::optional<Key> key_;
   std::vector<MirrorTurn> turns_;
   std::vector<float> ranges_m_, among_people_m_;
+  std::vector<Eigen::Vector3d> W_directions_;
+  std::vector<double> to_people_m_;
   std::size_t chunk_ = 4;
   std::uint64_t every_ = 1;
   std::uint64_t turns_cast_{};

@@ -34,9 +34,17 @@ std::string status(const std::string& command, std::string_view code) {
   return command + '\n' + with_sum(code);
 }
 
-void append_encoded(std::string& text, std::uint32_t value, int characters) {
+// Returns where the next one goes.
+char* encode(std::uint32_t value, int characters, char* to) {
   for (int shift = 6 * (characters - 1); shift >= 0; shift -= 6)
-    text += static_cast<char>((value >> shift & 63U) + 0x30);
+    *to++ = static_cast<char>((value >> shift & 63U) + 0x30);
+  return to;
+}
+
+std::string encoded(std::uint32_t value, int characters) {
+  std::string text(static_cast<std::size_t>(characters), '\0');
+  encode(value, characters, text.data());
+  return text;
 }
 
 }  // namespace
@@ -127,9 +135,7 @@ std::string HokuyoUnit::set_clock(const std::string& command) {
   if (command == "TM2") adjusting_ = false;
   if (command != "TM1") return status(command, "00");
   if (!adjusting_) return status(command, "0E");
-  std::string time;
-  append_encoded(time, device_ms(clock_.now()), 4);
-  return status(command, "00") + with_sum(time);
+  return status(command, "00") + with_sum(encoded(device_ms(clock_.now()), 4));
 }
 
 std::string HokuyoUnit::begin(const std::string& command) {
@@ -231,15 +237,16 @@ hal::Task<void> HokuyoUnit::measure() {
 
 std::string HokuyoUnit::scan_text(std::uint64_t number) {
   const auto ranges_m = ahead_.of(number, static_cast<std::uint64_t>(stream_.skip + 1));
-  std::string data;
-  data.reserve(ranges_m.size() * (stream_.intensities ? 6 : 3));
+  std::string data(ranges_m.size() * (stream_.intensities ? 6 : 3), '\0');
+  char* to = data.data();
+  const double factor = faults_.wrong_factor();
   for (const float range_m : ranges_m) {
-    const double mm = range_m * 1000.0 * faults_.wrong_factor() + 0.5;
+    const double mm = range_m * 1000.0 * factor + 0.5;
     const auto distance = static_cast<std::uint32_t>(mm);
     const bool within = scip_is_range(config_.parameters, distance);
-    append_encoded(data, within ? distance : 0, 3);
+    to = encode(within ? distance : 0, 3, to);
     if (stream_.intensities)
-      append_encoded(data, within ? static_cast<std::uint32_t>(5000 / (1 + range_m)) : 0, 3);
+      to = encode(within ? static_cast<std::uint32_t>(5000 / (1 + range_m)) : 0, 3, to);
   }
   std::string text = stream_.command + '\n';
   if (!stream_.endless) {
@@ -248,9 +255,7 @@ std::string HokuyoUnit::scan_text(std::uint64_t number) {
     text[14] = static_cast<char>('0' + left % 10);
   }
   text += with_sum("99");
-  std::string time;
-  append_encoded(time, device_ms(turn_start(number)), 4);
-  text += with_sum(time);
+  text += with_sum(encoded(device_ms(turn_start(number)), 4));
   text.reserve(text.size() + data.size() + data.size() / 32 + 3);
   for (std::size_t at = 0; at < data.size(); at += 64)
     append_with_sum(text, std::string_view(data).substr(at, 64));

@@ -1,5 +1,6 @@
 #include "sim/people.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -34,17 +35,26 @@ void Walker::walk(double span_s, const Eigen::Vector2d& robot_m, double robot_ra
 }
 
 double Walker::range_m(const Eigen::Vector3d& from, const Eigen::Vector3d& direction) const {
-  const double infinite = std::numeric_limits<double>::infinity();
-  const Eigen::Vector2d way = direction.head<2>();
+  double range_m = std::numeric_limits<double>::infinity();
+  shorten(from, {&direction, 1}, {&range_m, 1});
+  return range_m;
+}
+
+void Walker::shorten(const Eigen::Vector3d& from, std::span<const Eigen::Vector3d> directions,
+                     std::span<double> ranges_m) const {
   const Eigen::Vector2d to_axis = at_m_ - from.head<2>();
-  const double a = way.squaredNorm();
-  const double b = way.dot(to_axis);
   const double c = to_axis.squaredNorm() - person_.radius_m * person_.radius_m;
-  const double root = b * b - a * c;
-  if (a < 1e-12 || root < 0) return infinite;
-  const double range_m = (b - std::sqrt(root)) / a;
-  const double z_m = from.z() + range_m * direction.z();
-  return range_m > 0 && z_m >= 0 && z_m <= person_.height_m ? range_m : infinite;
+  for (std::size_t i = 0; i < directions.size(); ++i) {
+    const Eigen::Vector2d way = directions[i].head<2>();
+    const double a = way.squaredNorm();
+    const double b = way.dot(to_axis);
+    const double root = b * b - a * c;
+    if (a < 1e-12 || root < 0) continue;
+    const double range_m = (b - std::sqrt(root)) / a;
+    const double z_m = from.z() + range_m * directions[i].z();
+    if (range_m > 0 && z_m >= 0 && z_m <= person_.height_m)
+      ranges_m[i] = std::min(ranges_m[i], range_m);
+  }
 }
 
 }  // namespace sim

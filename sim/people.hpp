@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <vector>
 
 namespace sim {
@@ -26,6 +27,9 @@ class Walker {
   void walk(double span_s, const Eigen::Vector2d& robot_m, double robot_radius_m, bool robot_moves);
   // Along a ray (unit direction) whose origin is given above the ground; infinite: not met.
   double range_m(const Eigen::Vector3d& from, const Eigen::Vector3d& direction) const;
+  // The same along many rays from one origin: lowers those of ranges_m that are longer.
+  void shorten(const Eigen::Vector3d& from, std::span<const Eigen::Vector3d> directions,
+               std::span<double> ranges_m) const;
 
   const Eigen::Vector2d& position_m() const { return at_m_; }
   const Person& person() const { return person_; }

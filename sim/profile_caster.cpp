@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -15,6 +16,12 @@ namespace {
 
 constexpr std::uint32_t kTile = 4;  // Packets of 4 neighbouring beams of 4 turns after each other,
 constexpr std::uint32_t kPacket = kTile * kTile;  // or of so many beams of a single turn.
+
+// What a beam meets.
+struct Met {
+  float distance_m{};  // Infinite: nothing.
+  Eigen::Vector3f normal{0, 0, 0}, direction{0, 0, 0};
+};
 
 }  // namespace
 
@@ -35,8 +42,25 @@ struct ProfileCaster::Impl {
 
     std::uint32_t width() const { return turns.size() == 1 ? kPacket : kTile; }  // Beams.
     void aim(std::uint32_t beam, RTCRayHit16& rays, int* valid) const;
-    void cast(float* ranges_m) const;
+    // Calls meets(place among the turns, beam, what it meets) for each beam of each turn.
+    template <class Meets>
+    void cast(const Meets& meets) const;
   };
+
+  std::uint64_t key(std::uint64_t turn) const { return mix(mix(seed) ^ turn); }
+  float reported_m(const Met& met, std::uint64_t bits) const {
+    return std::isinf(met.distance_m)
+               ? 0.0F
+               : noise.reported_m(met.distance_m, met.normal, met.direction, bits);
+  }
+  void cast_still(const Eigen::Isometry3d& T_W_S, std::span<const MirrorTurn> turns,
+                  std::span<float> ranges_m);
+
+  // What the beams meet from where turns were cast last with the pan axis standing: until either
+  // turns, only the noise is another.
+  Eigen::Isometry3d T_W_S_still;
+  double pan_still_rad = 0;
+  std::vector<Met> met_still;  // Empty: not cast yet.
 };
 
 ProfileCaster::ProfileCaster(const Scene& scene, const ScannerModel& model, const MirrorArc& arc,
@@ -46,8 +70,15 @@ ProfileCaster::ProfileCaster(const Scene& scene, const ScannerModel& model, cons
     const double angle = arc.angle_first_rad + i * arc.angle_step_rad;
     directions.emplace_back(T_P_L.linear() * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0));
   }
-  impl_ = std::make_unique<Impl>(
-      Impl{scene, model, RangeNoise(model), seed, T_P_L.translation(), std::move(directions)});
+  impl_ = std::make_unique<Impl>(Impl{scene,
+                                      model,
+                                      RangeNoise(model),
+                                      seed,
+                                      T_P_L.translation(),
+                                      std::move(directions),
+                                      {},
+                                      0,
+                                      {}});
 }
 
 ProfileCaster::~ProfileCaster() = default;
@@ -87,7 +118,8 @@ void ProfileCaster::Impl::Strip::aim(std::uint32_t beam, RTCRayHit16& rays, int*
   }
 }
 
-void ProfileCaster::Impl::Strip::cast(float* ranges_m) const {
+template <class Meets>
+void ProfileCaster::Impl::Strip::cast(const Meets& meets) const {
   const auto beams = static_cast<std::uint32_t>(of.P_directions.size());
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
@@ -99,20 +131,40 @@ void ProfileCaster::Impl::Strip::cast(float* ranges_m) const {
     rtcIntersect16(valid, of.scene.embree(), &context, &rays);
     for (std::uint32_t i = 0; i < kPacket; ++i) {
       if (!valid[i]) continue;
-      const Eigen::Vector3f normal(rays.hit.Ng_x[i], rays.hit.Ng_y[i], rays.hit.Ng_z[i]);
-      const Eigen::Vector3f direction(rays.ray.dir_x[i], rays.ray.dir_y[i], rays.ray.dir_z[i]);
-      const std::uint32_t b = beam + i % width();
-      ranges_m[std::size_t{i / width()} * beams + b] =
-          rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID
-              ? 0.0F
-              : of.noise.reported_m(rays.ray.tfar[i], normal, direction,
-                                    mix(keys[i / width()] + b));
+      const bool any = rays.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
+      meets(i / width(), beam + i % width(),
+            Met{any ? rays.ray.tfar[i] : std::numeric_limits<float>::infinity(),
+                {rays.hit.Ng_x[i], rays.hit.Ng_y[i], rays.hit.Ng_z[i]},
+                {rays.ray.dir_x[i], rays.ray.dir_y[i], rays.ray.dir_z[i]}});
     }
   }
 }
 
+void ProfileCaster::Impl::cast_still(const Eigen::Isometry3d& T_W_S,
+                                     std::span<const MirrorTurn> turns, std::span<float> ranges_m) {
+  const std::size_t beams = P_directions.size();
+  const double pan_rad = turns.front().pan_first_rad;
+  if (met_still.empty() || pan_still_rad != pan_rad || T_W_S_still.matrix() != T_W_S.matrix()) {
+    met_still.resize(beams);
+    T_W_S_still = T_W_S;
+    pan_still_rad = pan_rad;
+    const Strip one{*this, T_W_S, turns.first(1), {}};
+    one.cast([&](std::uint32_t, std::uint32_t beam, const Met& met) { met_still[beam] = met; });
+  }
+  for (std::size_t turn = 0; turn < turns.size(); ++turn) {
+    const std::uint64_t bits = key(turns[turn].number);
+    for (std::size_t beam = 0; beam < beams; ++beam)
+      ranges_m[turn * beams + beam] = reported_m(met_still[beam], mix(bits + beam));
+  }
+}
+
 void ProfileCaster::cast(const Eigen::Isometry3d& T_W_S, std::span<const MirrorTurn> turns,
-                         int threads, std::span<float> ranges_m) const {
+                         int threads, std::span<float> ranges_m) {
+  const bool still = std::ranges::all_of(turns, [&](const MirrorTurn& turn) {
+    return turn.pan_first_rad == turns.front().pan_first_rad &&
+           turn.pan_end_rad == turn.pan_first_rad;
+  });
+  if (still) return impl_->cast_still(T_W_S, turns, ranges_m);
   const std::size_t beams = impl_->P_directions.size();
   for_each_chunk((turns.size() + kTile - 1) / kTile, threads, [&](std::size_t strip) {
     const std::size_t first = strip * kTile;
@@ -121,8 +173,10 @@ void ProfileCaster::cast(const Eigen::Isometry3d& T_W_S, std::span<const MirrorT
                     turns.subspan(first, std::min<std::size_t>(kTile, turns.size() - first)),
                     {}};
     for (std::size_t i = 0; i < one.turns.size(); ++i)
-      one.keys[i] = mix(mix(impl_->seed) ^ one.turns[i].number);
-    one.cast(&ranges_m[first * beams]);
+      one.keys[i] = impl_->key(one.turns[i].number);
+    one.cast([&](std::uint32_t turn, std::uint32_t beam, const Met& met) {
+      ranges_m[(first + turn) * beams + beam] = impl_->reported_m(met, mix(one.keys[turn] + beam));
+    });
   });
 }
 

@@ -34,13 +34,13 @@ class ProfileCaster {
   ~ProfileCaster();
 
   // ranges_m: turns x beams, one turn after the other; 0 where nothing comes back. The answer does
-  // not depend on `threads`.
+  // not depend on `threads`, nor on what was cast before. For one thread at a time.
   void cast(const Eigen::Isometry3d& T_W_S, std::span<const MirrorTurn> turns, int threads,
-            std::span<float> ranges_m) const;
+            std::span<float> ranges_m);
 
  private:
   struct Impl;
-  std::unique_ptr<const Impl> impl_;
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace sim

@@ -155,12 +155,17 @@ bool World::runs_into_person(const Eigen::Vector2d& to) const {
 
 double World::range_to_people_m(const Eigen::Vector3d& W_from,
                                 const Eigen::Vector3d& W_direction) const {
-  double nearest_m = std::numeric_limits<double>::infinity();
-  for (const Walker& walker : people_)
-    nearest_m = std::min(
-        nearest_m,
-        walker.range_m(W_from - config_.ground_z_m * Eigen::Vector3d::UnitZ(), W_direction));
+  double nearest_m{};
+  ranges_to_people_m(W_from, {&W_direction, 1}, {&nearest_m, 1});
   return nearest_m;
+}
+
+void World::ranges_to_people_m(const Eigen::Vector3d& W_from,
+                               std::span<const Eigen::Vector3d> W_directions,
+                               std::span<double> ranges_m) const {
+  std::ranges::fill(ranges_m, std::numeric_limits<double>::infinity());
+  const Eigen::Vector3d above_ground = W_from - config_.ground_z_m * Eigen::Vector3d::UnitZ();
+  for (const Walker& walker : people_) walker.shorten(above_ground, W_directions, ranges_m);
 }
 
 double World::roll(Side& side) {

@@ -111,6 +111,10 @@ class World {
   const std::vector<Walker>& people() const { return people_; }
   // How far away along a ray (unit direction) the first of them is; infinite: none.
   double range_to_people_m(const Eigen::Vector3d& W_from, const Eigen::Vector3d& W_direction) const;
+  // The same along many rays from one origin.
+  void ranges_to_people_m(const Eigen::Vector3d& W_from,
+                          std::span<const Eigen::Vector3d> W_directions,
+                          std::span<double> ranges_m) const;
 
   // What the sensors say at the latest tick. Each has one reader: asking again draws new noise.
   hal::WheelTravel take_travel();  // Whole encoder ticks since the last call.

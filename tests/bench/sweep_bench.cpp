@@ -116,7 +116,7 @@ void BM_CastProfiles(benchmark::State& state) {
   const sim::Scene scene(sim_test::town());
   const auto config = unit_config(1);
   const sim::MirrorArc arc{1140, -95 * kDeg, 0.1667 * kDeg};
-  const sim::ProfileCaster caster(scene, config.ranges, arc, config.T_P_L, 1);
+  sim::ProfileCaster caster(scene, config.ranges, arc, config.T_P_L, 1);
   Eigen::Isometry3d T_W_S = Eigen::Isometry3d::Identity();
   T_W_S.translation() << 9, -92, 1.8;
   std::vector<float> ranges_m(64 * arc.beams);

@@ -47,6 +47,29 @@ TEST(Computer, WaitsForADiskThatFlushesSlowly) {
   EXPECT_GT(slow.virtual_time, before.virtual_time + 1s);
 }
 
+TEST(Computer, StandsWhileItsDiskFailsAndGoesOnWhenItWorksAgain) {
+  const dst::Outcome before = run(quiet());
+  for (const dst::DiskFault fault : {dst::DiskFault::full, dst::DiskFault::io_error})
+    for (const int eighths : {1, 3, 5, 7}) {
+      const hal::Duration from = eighths * before.virtual_time / 8;
+      SCOPED_TRACE(testing::Message() << dst::name(fault) << " after " << hal::seconds(from));
+      dst::Scenario scenario = quiet();
+      scenario.disk = dst::DiskTrouble{fault, from, 100s};
+      dst::Options options;
+      options.observe = true;
+      const dst::Outcome outcome = dst::run_mission(dst::make_quiet_yard(), scenario, options);
+      EXPECT_FALSE(outcome.violation) << dst::report(0, *outcome.violation);
+      EXPECT_TRUE(outcome.completed) << outcome.end;
+      EXPECT_EQ(outcome.resumed, 0);
+      EXPECT_EQ(outcome.scans, before.scans);
+      EXPECT_TRUE(outcome.held);
+      const char* const name =
+          fault == dst::DiskFault::full ? "F700-disk-full" : "F701-disk-failed";
+      EXPECT_TRUE(outcome.named.contains(name)) << testing::PrintToString(outcome.named);
+      EXPECT_GT(outcome.virtual_time, before.virtual_time + 80s);
+    }
+}
+
 TEST(Computer, EndsByNameWhenItsDiskFailsAndGoesOnWhenItIsMended) {
   const dst::Outcome before = run(quiet());
   for (const dst::DiskFault fault : {dst::DiskFault::full, dst::DiskFault::io_error})
@@ -70,6 +93,21 @@ TEST(Computer, KeepsEveryScanWhenItsPowerIsCutAnywhere) {
     scenario.power_cut = dst::PowerCut{i * before.virtual_time / 9, 17 * i};
     const dst::Outcome outcome = run(scenario);
     EXPECT_EQ(outcome.resumed, 1);
+    EXPECT_TRUE(outcome.completed) << outcome.end;
+    EXPECT_EQ(outcome.scans, before.scans);
+  }
+}
+
+TEST(Computer, KeepsEveryScanWhenItsPowerIsCutAgainAsItGoesOn) {
+  const dst::Outcome before = run(quiet());
+  for (int i = 1; i <= 3; ++i) {
+    SCOPED_TRACE(testing::Message() << "cut after " << i << " quarters");
+    dst::Scenario scenario = quiet();
+    scenario.seed = static_cast<std::uint64_t>(i);
+    scenario.power_cut = dst::PowerCut{i * before.virtual_time / 4, 17 * i};
+    scenario.cut_again = dst::PowerCut{10s * i, 31 * i};
+    const dst::Outcome outcome = run(scenario);
+    EXPECT_EQ(outcome.resumed, 2);
     EXPECT_TRUE(outcome.completed) << outcome.end;
     EXPECT_EQ(outcome.scans, before.scans);
   }

@@ -11,11 +11,13 @@
 
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
+#include <cerrno>
 #include <cstdlib>
 #include <fstream>
 #include <random>
 
 #include "sim/sim_clock.hpp"
+#include "tests/mission/disk_trace.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace {
@@ -192,8 +194,8 @@ struct Writing : JournalTest {
   }
   hal::Task<void> append(int times) {
     for (int i = 0; i < times; ++i) {
-      auto number = co_await journal->append("scan", "{}");
-      numbers.push_back(number.value());
+      const std::int64_t number = co_await journal->append("scan", "{}");
+      numbers.push_back(number);
     }
   }
 };
@@ -215,6 +217,28 @@ TEST_F(Writing, SharesACommitAmongWhatComesTogetherWithinItsBound) {
   std::ranges::sort(numbers);
   for (std::size_t i = 0; i < numbers.size(); ++i)
     ASSERT_EQ(numbers[i], static_cast<std::int64_t>(i) + 1);
+}
+
+TEST_F(Writing, WaitsForADiskThatIsFullAndWritesAllOfItInItsOrder) {
+  bool full = false;
+  mission_test::DiskTrace trace([&](mission_test::DiskOp::Kind kind) {
+    return full && kind == mission_test::DiskOp::Kind::write ? ENOSPC : 0;
+  });
+  make();
+  boost::asio::co_spawn(io, append(3), rethrow);
+  ASSERT_TRUE(clock.run([&] { return numbers.size() == 3; }));
+  EXPECT_FALSE(journal->trouble());
+  full = true;
+  journal->tell("place", "{}");
+  boost::asio::co_spawn(io, append(2), rethrow);
+  ASSERT_TRUE(clock.run([&] { return clock.now() > hal::Time(10s); }));
+  EXPECT_EQ(numbers.size(), 3U) << "acknowledged, and not durable";
+  ASSERT_TRUE(journal->trouble());
+  EXPECT_EQ(journal->trouble()->code, boost::system::errc::no_space_on_device);
+  full = false;
+  ASSERT_TRUE(clock.run([&] { return numbers.size() == 5; }));
+  EXPECT_FALSE(journal->trouble());
+  EXPECT_EQ(numbers, (std::vector<std::int64_t>{1, 2, 3, 5, 6}));
 }
 
 }  // namespace

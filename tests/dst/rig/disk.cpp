@@ -1,11 +1,13 @@
 #include "tests/dst/rig/disk.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <random>
 
 namespace dst {
 namespace {
 
+namespace fs = std::filesystem;
 using Kind = mission_test::DiskOp::Kind;
 
 constexpr hal::Duration kSlowFlush = std::chrono::milliseconds(400);
@@ -17,7 +19,30 @@ bool is_of_journal(const std::filesystem::path& path) {
 }  // namespace
 
 Disk::Disk(std::filesystem::path folder)
-    : folder_(std::move(folder)), trace_([this](Kind kind) { return answer(kind); }) {}
+    : folder_(std::move(folder)), trace_([this](Kind kind) { return answer(kind); }) {
+  if (fs::exists(folder_)) note_what_is_there();
+}
+
+// The journal's files come last: up to their flush everything is there.
+void Disk::note_what_is_there() {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder_))
+    if (entry.is_regular_file()) files.push_back(entry.path());
+  std::ranges::sort(files, {}, [](const fs::path& path) {
+    return std::pair(is_of_journal(path), path.string());
+  });
+  const auto note = [this](Kind kind, const fs::path& path, std::string bytes) {
+    const int file = trace_.number_of(path, kind == Kind::create);
+    trace_.note({kind, file, path, {}, 0, std::move(bytes)});
+  };
+  for (const fs::path& path : files) {
+    note(Kind::create, path, {});
+    note(Kind::write, path, mission::read_file(path).value());
+  }
+  for (const fs::path& inside : {folder_, folder_ / "scans"})
+    trace_.note({Kind::sync_folder, 0, inside, {}, 0, {}});
+  for (const fs::path& path : files) note(Kind::sync, path, {});
+}
 
 // An errno, or -1 for a short write.
 int Disk::answer(Kind kind) {

@@ -15,7 +15,8 @@ namespace dst {
 
 class Disk {
  public:
-  // Of this thread, from now on; one at a time. `folder` need not be there yet.
+  // Of this thread, from now on; one at a time. `folder` need not be there yet; what is in it is on
+  // the disk already.
   explicit Disk(std::filesystem::path folder);
 
   void set(DiskFault fault) { fault_ = fault; }
@@ -34,6 +35,7 @@ class Disk {
 
  private:
   int answer(mission_test::DiskOp::Kind kind);
+  void note_what_is_there();
 
   const std::filesystem::path folder_;
   std::optional<DiskFault> fault_;

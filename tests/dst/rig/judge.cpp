@@ -23,7 +23,9 @@ constexpr hal::Duration kSilentMax = 100ms + kStopMax;
 constexpr hal::Duration kInputsMax = 300ms + kStopMax;
 constexpr hal::Duration kRollsOutMax = 3s;  // Until the wheels of a skid-steered base stand.
 constexpr hal::Duration kProofMax = 4s;     // Of the drive's own time-out.
-constexpr int kCreep_mmps = 20;             // What that may be told.
+// From the last key to the zero frame.
+constexpr hal::Duration kDeadManMax = 200ms + kStopMax;
+constexpr int kCreep_mmps = 20;  // What that may be told.
 constexpr double kOver = 1.02;
 
 bool stands(const agilex::MotionCommand& told) {
@@ -72,7 +74,7 @@ void Judge::on_motion(const agilex::MotionCommand& told) {
     measuring_ = false;
     slowest_stop_ = std::max(slowest_stop_, now - *stopped_at_);
   }
-  if (stands(told)) return;
+  if (stands(told)) return stop_ordered_at_.reset();
   const std::string what =
       fmt::format("told {} mm/s, {} mrad/s", told.forward_mmps, told.turn_mradps);
   const mission::BodyConfig& body = rig_.config().body;
@@ -89,6 +91,14 @@ void Judge::on_motion(const agilex::MotionCommand& told) {
     violated(
         "no motion while the drive does not report",
         fmt::format("{}; the last report is {:.3f} s old", what, hal::seconds(now - reported_at_)));
+  if (survey_.gate().mode() == mission::Mode::teleop && now - key_at_ > kDeadManMax)
+    violated("the robot stands when the dead-man key is let go",
+             fmt::format("{}; the last key is {:.3f} s old", what, hal::seconds(now - key_at_)));
+  if (survey_.gate().mode() == mission::Mode::autonomous && disk_failed_at_ &&
+      now - *disk_failed_at_ > kStopMax)
+    violated(
+        "a mission whose disk fails stands",
+        fmt::format("{}; it has failed for {:.3f} s", what, hal::seconds(now - *disk_failed_at_)));
   if (creeps(told))
     crept_at_ = now;
   else
@@ -108,6 +118,24 @@ void Judge::on_press(Press what) {
 void Judge::on_release() {
   released_at_ = clock_.now();
   if (cause_.empty()) may_move_ = true;
+}
+
+void Judge::on_order(const mission::ConsoleOrder& order) {
+  using Kind = mission::ConsoleOrder::Kind;
+  if (order.kind == Kind::stop) return on_stop_order();
+  const bool stands_still = order.kind == Kind::drive && !order.packet.dead_man;
+  if (order.kind == Kind::pause || stands_still) return;
+  if (!password_typed_)
+    violated("nothing moves by a console at which nobody is logged in",
+             fmt::format("order {}", static_cast<int>(order.kind)));
+  if (order.kind == Kind::drive) key_at_ = clock_.now();
+  if (order.kind == Kind::arm && survey_.gate().begun() && !survey_.gate().released()) on_release();
+}
+
+void Judge::on_stop_order() {
+  may_move_ = false;
+  if (!measuring_) stopped_at_ = clock_.now();
+  if (!stands(told_) && !stop_ordered_at_) stop_ordered_at_ = clock_.now();
 }
 
 // What stops the robot, as the drivers tell; empty: nothing.
@@ -162,6 +190,8 @@ void Judge::look_at_world() {
   sim::World& world = rig_.world();
   if (world.collisions() > collisions_) {
     collisions_ = world.collisions();
+    // An operator sees where they drive, or does not.
+    if (now - driven_by_hand_at_ < kRollsOutMax) return;
     const hal::Pose2& at = world.robot().pose;
     violated("the robot touches nothing",
              fmt::format("at ({:.2f}, {:.2f})", at.position_m.x(), at.position_m.y()));
@@ -184,7 +214,8 @@ void Judge::look() {
   const hal::Time now = clock_.now();
   const hal::DriveStatus status = rig_.drivers().drive().status();
   reported_at_ = status.reported_at;
-  if (!may_move_ || !survey_.watch().well()) stood_ += now - looked_at_;
+  const bool waits = survey_.survey().orders().waits();
+  if (!may_move_ || waits || disk_failed_at_ || !survey_.watch().well()) stood_ += now - looked_at_;
   looked_at_ = now;
   look_at_causes(status);
   if (rig_.is_cut("drive")) {  // Nothing gets through: the base's own time-out has to do.
@@ -194,8 +225,21 @@ void Judge::look() {
   if (measuring_ && now - *stopped_at_ > kStopMax)
     violated("a zero command within one gate period and a frame of every cause to stop",
              fmt::format("{}: none after {:.3f} s", cause_, hal::seconds(now - *stopped_at_)));
+  const bool disk_failed = survey_.survey().disk_fault().has_value();
+  if (disk_failed != disk_failed_at_.has_value())
+    disk_failed_at_ = disk_failed ? std::optional(now) : std::nullopt;
   look_at_presses();
+  look_at_console();
   look_at_world();
+}
+
+void Judge::look_at_console() {
+  const hal::Time now = clock_.now();
+  if (survey_.gate().mode() == mission::Mode::teleop) driven_by_hand_at_ = now;
+  if (rig_.is_cut("drive")) stop_ordered_at_.reset();
+  if (stop_ordered_at_ && now - *stop_ordered_at_ > kStopMax)
+    violated("`stop` ends in a zero command within one gate period and a frame",
+             fmt::format("none after {:.3f} s", hal::seconds(now - *stop_ordered_at_)));
 }
 
 void Judge::on_end(bool ended) {

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "mission/console.hpp"
 #include "mission/main_hardware.hpp"
 #include "tests/dst/rig/rig.hpp"
 
@@ -13,6 +14,20 @@ namespace dst {
 struct Violation {
   hal::Time at{};
   std::string invariant, seen;
+};
+
+// FNV-1a of 64 bits.
+class Hash {
+ public:
+  void add(char byte) { hash_ = (hash_ ^ static_cast<unsigned char>(byte)) * kPrime; }
+  void add(std::uint64_t value) {
+    for (int byte = 0; byte < 8; ++byte) hash_ = (hash_ ^ (value >> 8 * byte & 0xFF)) * kPrime;
+  }
+  std::uint64_t value() const { return hash_; }
+
+ private:
+  static constexpr std::uint64_t kPrime = 0x100000001b3;
+  std::uint64_t hash_ = 0xcbf29ce484222325;
 };
 
 class Judge {
@@ -25,6 +40,10 @@ class Judge {
   // A person presses something that stops the robot, or asks for its release.
   void on_press(Press what);
   void on_release();
+  // The right password is typed at a console: from now on somebody may be logged in there.
+  void on_password() { password_typed_ = true; }
+  // A console has the robot do something.
+  void on_order(const mission::ConsoleOrder& order);
   // At the end of each instant: nothing can run any more before time moves.
   void look();
   // When the mission has ended, or should have.
@@ -37,25 +56,14 @@ class Judge {
   std::uint64_t frames_hash() const { return frames_.value(); }
 
  private:
-  // FNV-1a of 64 bits.
-  class Hash {
-   public:
-    void add(std::uint64_t value) {
-      for (int byte = 0; byte < 8; ++byte) hash_ = (hash_ ^ (value >> 8 * byte & 0xFF)) * kPrime;
-    }
-    std::uint64_t value() const { return hash_; }
-
-   private:
-    static constexpr std::uint64_t kPrime = 0x100000001b3;
-    std::uint64_t hash_ = 0xcbf29ce484222325;
-  };
-
   void violated(std::string invariant, std::string seen);
   std::string cause(const hal::DriveStatus& status) const;
   void look_at_causes(const hal::DriveStatus& status);
   void look_at_presses();
   void look_at_world();
   void on_motion(const drivers::agilex::MotionCommand& told);
+  void on_stop_order();
+  void look_at_console();
   bool may_creep(hal::Time now) const;
 
   hal::Clock& clock_;
@@ -74,6 +82,10 @@ class Judge {
   bool measuring_ = false;  // The zero frame is awaited.
   std::optional<hal::Time> board_pressed_at_, safety_pressed_at_;
   int stops_ = 0, collisions_ = 0;
+  bool password_typed_ = false;
+  std::optional<hal::Time> disk_failed_at_;   // It fails just now.
+  std::optional<hal::Time> stop_ordered_at_;  // The zero frame after it is awaited.
+  hal::Time key_at_{-std::chrono::hours(1)}, driven_by_hand_at_ = key_at_;
   hal::Duration slowest_stop_{}, stood_{};
   hal::Time looked_at_{};
 };

@@ -1,7 +1,7 @@
-// vantage-dst: missions of the shipped executive and drivers on simulated devices that fail, and on
-// a computer whose clock is set, whose disk fails and whose power is cut, one for each seed, in
-// virtual time. Ends with 1 at the first seed that violates what must always
-// hold, and says how to see it again.
+// vantage-dst: missions of the shipped executive and drivers on simulated devices that fail, on a
+// computer whose clock is set, whose disk fails and whose power is cut, and with somebody at its
+// console, one for each seed, in virtual time. Ends with 1 at the first seed that violates what
+// must always hold, and says how to see it again.
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -30,8 +30,12 @@ void tell(const dst::Outcome& outcome) {
   fmt::print("  {} scans, {:.1f} m, {:.1f} s of virtual time in {:.2f} s of a core; end: {}\n",
              outcome.scans, outcome.driven_m, hal::seconds(outcome.virtual_time), outcome.cpu_s,
              outcome.end);
-  fmt::print("  trace: decisions {:016x}, frames {:016x}, journal {:016x}; gone on with {} times\n",
-             outcome.decisions_hash, outcome.frames_hash, outcome.journal_hash, outcome.resumed);
+  fmt::print(
+      "  trace: decisions {:016x}, frames {:016x}, journal {:016x}, console {:016x}; gone on with "
+      "{} "
+      "times\n",
+      outcome.decisions_hash, outcome.frames_hash, outcome.journal_hash, outcome.console_hash,
+      outcome.resumed);
 }
 
 int replay(std::uint64_t seed) {

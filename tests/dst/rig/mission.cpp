@@ -15,6 +15,7 @@
 #include "mission/resume.hpp"
 #include "sim/sim_clock.hpp"
 #include "tests/dst/rig/disk.hpp"
+#include "tests/dst/rig/operator.hpp"
 #include "tests/dst/rig/wall_clock.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -155,14 +156,21 @@ class Mission {
         survey_(prepared_, 1, config(begin),
                 {io_, clock_, rig_.drivers(), run_.store, progress_, compute_, &journal_,
                  run_.past ? &*run_.past : nullptr}),
-        judge_(clock_, rig_, survey_, begin.after_cut) {}
+        judge_(clock_, rig_, survey_, begin.after_cut) {
+    if (scenario.at_console)
+      operator_ = std::make_unique<OperatorAtConsole>(
+          *scenario.at_console,
+          OperatorAtConsole::Parts{io_, clock_, compute_, survey_, rig_.drivers(), judge_},
+          begin.folder.parent_path());
+  }
 
   Outcome run();
   const Disk& disk() const { return disk_; }
   hal::Pose2 stands() { return rig_.world().robot().pose; }
 
  private:
-  static mission::GuardedSurvey::Config config(const Begin& begin);
+  mission::GuardedSurvey::Config config(const Begin& begin);
+  bool stands_for_a_person();
   std::vector<Happening> happenings();
   void add_computer(std::vector<Happening>& all);
   bool loses_power();
@@ -181,7 +189,8 @@ class Mission {
   const Scenario& scenario_;
   const Options options_;
   const Begin begin_;
-  boost::asio::io_context io_{1};
+  // All of a mission runs on one thread.
+  boost::asio::io_context io_{BOOST_ASIO_CONCURRENCY_HINT_UNSAFE};
   sim::SimClock clock_{io_};
   WallClock wall_clock_;
   Disk disk_;
@@ -194,6 +203,7 @@ class Mission {
   Rig rig_;
   mission::GuardedSurvey survey_;
   Judge judge_;
+  std::unique_ptr<OperatorAtConsole> operator_;  // Null: nobody is there.
   Outcome outcome_;
   int releases_ = 0;  // Since the robot stopped.
   int steps_ = 0;     // Since the time of the power cut.
@@ -203,6 +213,9 @@ class Mission {
 mission::GuardedSurvey::Config Mission::config(const Begin& begin) {
   mission::GuardedSurvey::Config config;
   if (begin.after_cut) config.boot = mission::Boot::power_cut;
+  config.watch.tell = [this](const std::string& what) {
+    if (operator_) operator_->tell(what);
+  };
   return config;
 }
 
@@ -265,12 +278,18 @@ hal::Task<void> Mission::fate() {
   }
 }
 
+// Stopped, or told to stand by somebody at the console.
+bool Mission::stands_for_a_person() {
+  const mission::GatedDrive& gate = survey_.gate();
+  return gate.mode() == mission::Mode::stopped || (operator_ && gate.begun() && !gate.released());
+}
+
 // Releases the robot when it has been standing stopped for a while and nothing is pressed any more.
 hal::Task<void> Mission::person() {
   hal::Time since = clock_.now();
   for (;;) {
     co_await clock_.sleep_for(kPersonLooks);
-    const bool stopped = survey_.gate().mode() == mission::Mode::stopped;
+    const bool stopped = stands_for_a_person();
     if (!stopped) releases_ = 0;
     if (!stopped || rig_.pressed()) since = clock_.now();
     if (clock_.now() - since < scenario_.releases_after) continue;
@@ -333,6 +352,7 @@ void Mission::run_to_the_end() {
   boost::asio::co_spawn(io_, rig_.units().run(), rethrow);
   survey_.start();
   boost::asio::co_spawn(io_, person(), rethrow);
+  if (operator_) operator_->begin();
   if (options_.observe) boost::asio::co_spawn(io_, observe(), rethrow);
   if (options_.each_minute) boost::asio::co_spawn(io_, tell_minutes(), rethrow);
   const hal::Time late(options_.ends_within);
@@ -355,6 +375,7 @@ Outcome Mission::outcome() {
   outcome_.decisions_hash = hash_of(begin_.folder / "decisions.jsonl");
   outcome_.decisions = last_lines(begin_.folder / "decisions.jsonl");
   outcome_.frames_hash = judge_.frames_hash();
+  if (operator_) outcome_.console_hash = operator_->hash();
   outcome_.stops = judge_.stops();
   outcome_.slowest_stop = judge_.slowest_stop();
   if (!outcome_.violation) outcome_.violation = judge_.violation();
@@ -392,14 +413,26 @@ struct Left {
   hal::Pose2 stands;
 };
 
+// Scans that count, and would be gone with the power.
+std::optional<Violation> not_durable(const Disk& disk, const fs::path& flushed,
+                                     const Outcome& outcome) {
+  disk.copy_flushed(flushed);
+  const std::size_t safe = scans_in(flushed).size();
+  if (safe == outcome.scans) return std::nullopt;
+  return Violation{hal::Time(outcome.virtual_time), "no scan counts that is not durable",
+                   fmt::format("{} count, {} are flushed", outcome.scans, safe)};
+}
+
 Left run_leg(const support::RandomYard& yard, const Scenario& scenario, const Options& options,
              const Begin& begin) {
   Mission mission(yard, scenario, options, begin);
-  const Outcome outcome = mission.run();
+  Outcome outcome = mission.run();
   if (!begin.after_cut && outcome.end.starts_with("F70")) {  // The disk ended it.
     mission.disk().copy_flushed(begin.flushed);
     mission.disk().copy(begin.next);
   }
+  if (outcome.completed && scenario.disk && !outcome.violation)
+    outcome.violation = not_durable(mission.disk(), begin.flushed, outcome);
   return {outcome, mission.stands()};
 }
 
@@ -413,6 +446,7 @@ void add(Outcome& sum, const Outcome& next) {
   sum.decisions_hash ^= first.decisions_hash * 3;
   sum.frames_hash ^= first.frames_hash * 3;
   sum.journal_hash ^= first.journal_hash * 3;
+  sum.console_hash ^= first.console_hash * 3;
   sum.named.insert(first.named.begin(), first.named.end());
   sum.held |= first.held;
   sum.resumed = first.resumed + 1;
@@ -434,11 +468,11 @@ std::string lost_or_repeated(const fs::path& run, const std::vector<std::uint64_
   return "";
 }
 
-// A person goes on where power or disk ended it, with devices that are well and a disk that is.
+// A person goes on where power or disk ended it, with devices that are well and a disk that is. The
+// power may be cut once more.
 void go_on(const support::RandomYard& yard, const Scenario& scenario, const Options& options,
-           const fs::path& folder, const Left& left, Outcome& outcome) {
-  const fs::path next = folder / "next", flushed = folder / "flushed";
-  const std::vector<std::uint64_t> safe = scans_in(flushed), there = scans_in(next);
+           const Begin& before, const Left& left, Outcome& outcome) {
+  const std::vector<std::uint64_t> safe = scans_in(before.flushed), there = scans_in(before.next);
   if (!begins_with(there, safe)) {
     outcome.violation = {hal::Time(outcome.virtual_time), "every acknowledged scan is kept",
                          fmt::format("{} of {} are there", there.size(), safe.size())};
@@ -448,7 +482,14 @@ void go_on(const support::RandomYard& yard, const Scenario& scenario, const Opti
   well.seed = scenario.seed;
   well.releases_after = scenario.releases_after;
   well.by_button = scenario.by_button;
-  const Begin begin{left.stands, there.empty() ? folder / "anew" : next, true, !there.empty()};
+  well.power_cut = scenario.cut_again;
+  const auto again = [](fs::path path) { return path += "+"; };
+  const Begin begin{left.stands,
+                    there.empty() ? again(before.folder) : before.next,
+                    true,
+                    !there.empty(),
+                    again(before.flushed),
+                    again(before.next)};
   const Left second = run_leg(yard, well, options, begin);
   add(outcome, second.outcome);
   outcome.journal_hash ^= hash_of(events_in(begin.folder));
@@ -456,6 +497,8 @@ void go_on(const support::RandomYard& yard, const Scenario& scenario, const Opti
       !wrong.empty() && !outcome.violation)
     outcome.violation = {hal::Time(outcome.virtual_time),
                          "every acknowledged scan is kept, and none is taken again", wrong};
+  if (!outcome.violation && fs::exists(begin.next))
+    go_on(yard, well, options, begin, second, outcome);
 }
 
 }  // namespace
@@ -472,7 +515,7 @@ Outcome run_mission(const support::RandomYard& yard, const Scenario& scenario,
   outcome.journal_hash = hash_of(events_in(begin.folder));
   if (outcome.violation || !fs::exists(begin.next)) return outcome;
   try {
-    go_on(yard, scenario, options, folder.path(), left, outcome);
+    go_on(yard, scenario, options, begin, left, outcome);
   } catch (const std::exception& error) {
     outcome.violation = {hal::Time(outcome.virtual_time), "a run that was cut can be gone on with",
                          error.what()};

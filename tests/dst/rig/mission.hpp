@@ -23,7 +23,7 @@ struct Outcome {
   hal::Duration virtual_time{};
   double cpu_s{};  // Of one core.
   double driven_m{};
-  std::uint64_t decisions_hash{}, frames_hash{}, journal_hash{};  // The trace.
+  std::uint64_t decisions_hash{}, frames_hash{}, journal_hash{}, console_hash{};  // The trace.
   int resumed{};  // How often a person went on with the run: after a power cut, a failed disk.
   int stops{};
   hal::Duration slowest_stop{};
@@ -34,8 +34,8 @@ struct Outcome {
   // Equal for equal traces.
   bool same_trace(const Outcome& other) const {
     return decisions_hash == other.decisions_hash && frames_hash == other.frames_hash &&
-           journal_hash == other.journal_hash && virtual_time == other.virtual_time &&
-           end == other.end;
+           journal_hash == other.journal_hash && console_hash == other.console_hash &&
+           virtual_time == other.virtual_time && end == other.end;
   }
 };
 

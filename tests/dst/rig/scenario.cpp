@@ -7,6 +7,7 @@
 #include <map>
 #include <numbers>
 
+#include "tests/dst/rig/operator.hpp"
 #include "tests/support/random_site.hpp"
 
 namespace dst {
@@ -17,6 +18,7 @@ using support::Dice;
 
 constexpr std::uint64_t kScenarioDraw = 0x5eed;  // Another stream than that of the yard.
 constexpr std::uint64_t kComputerDraw = 0xc0de;  // Nor that of the devices.
+constexpr std::uint64_t kConsoleDraw = 0x50e5;   // Nor those.
 constexpr double kWithin_s = 150;                // Most missions last longer.
 constexpr double kLate_max_s = 300;
 constexpr hal::Duration kLongest = std::chrono::minutes(2);
@@ -98,6 +100,17 @@ void draw_computer(Dice& dice, Scenario& scenario) {
     scenario.disk =
         DiskTrouble{static_cast<DiskFault>(dice.below(4)), draw_time(dice), draw_during(dice)};
   if (dice.below(3) == 0) scenario.power_cut = PowerCut{draw_time(dice), dice.below(200)};
+  if (scenario.power_cut && dice.below(2) == 0)
+    scenario.cut_again = PowerCut{hal::from_seconds(dice.uniform(0, 90)), dice.below(200)};
+}
+
+// As one would write it down.
+std::string shown(const std::string& bytes) {
+  std::string text;
+  for (const char byte : bytes)
+    text += byte >= ' ' && byte < 0x7F ? std::string(1, byte)
+                                       : fmt::format("\\x{:02x}", static_cast<unsigned char>(byte));
+  return text;
 }
 
 }  // namespace
@@ -124,6 +137,8 @@ Scenario draw_scenario(std::uint64_t seed) {
                     .clock_jumps = {},
                     .disk = {},
                     .power_cut = {},
+                    .cut_again = {},
+                    .at_console = {},
                     .releases_after = hal::from_seconds(dice.uniform(1, 60)),
                     .by_button = dice.below(2) == 0};
   if (dice.below(4) == 0) draw_arrivals(dice, scenario);
@@ -147,6 +162,8 @@ Scenario draw_scenario(std::uint64_t seed) {
         {draw_time(dice), dice.below(2) == 0 ? kDaysOf56Years : -kDaysOf56Years});
   Dice computer(seed ^ kComputerDraw << 32);
   draw_computer(computer, scenario);
+  Dice console(seed ^ kConsoleDraw << 32);
+  if (console.below(3) == 0) scenario.at_console = draw_operator(console, kWithin_s);
   return scenario;
 }
 
@@ -175,6 +192,19 @@ std::string text(const Scenario& scenario) {
   if (const auto& cut = scenario.power_cut)
     lines.emplace(cut->from, fmt::format("  {:8.3f} s  and {} steps: the power is cut\n",
                                          hal::seconds(cut->from), cut->steps));
+  if (const auto& cut = scenario.cut_again)
+    lines.emplace(
+        kForEver,
+        fmt::format("  {:8.3f} s  and {} steps after it is gone on with: it is cut again\n",
+                    hal::seconds(cut->from), cut->steps));
+  if (const auto& who = scenario.at_console) {
+    for (const Operator::Typed& typed : who->typed)
+      lines.emplace(typed.at, fmt::format("  {:8.3f} s  typed: {}\n", hal::seconds(typed.at),
+                                          shown(typed.bytes)));
+    if (who->disturbed_during > hal::Duration{})
+      add(who->disturbed_from, who->disturbed_during, "the console's line is disturbed");
+    if (who->cut_from) add(*who->cut_from, who->cut_during, "the console's line is cut");
+  }
   std::string all =
       fmt::format("  a person releases the robot after {:.1f} s by {}\n",
                   hal::seconds(scenario.releases_after), scenario.by_button ? "button" : "console");

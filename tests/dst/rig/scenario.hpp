@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "hal/values.hpp"
+#include "sim/link_faults.hpp"
 #include "sim/unit_faults.hpp"
 
 namespace dst {
@@ -66,6 +67,20 @@ struct PowerCut {
   int steps{};
 };
 
+// At the serial console: what their keys send, and what the line does to it.
+struct Operator {
+  struct Typed {
+    hal::Duration at{};
+    std::string bytes;
+  };
+  bool knows_password{};
+  std::vector<Typed> typed;  // In the order of time.
+  sim::LinkFaults disturbed;
+  hal::Duration disturbed_from{}, disturbed_during{};
+  std::optional<hal::Duration> cut_from;
+  hal::Duration cut_during{};
+};
+
 struct Scenario {
   std::uint64_t seed{};
   std::vector<DeviceFault> faults;
@@ -74,7 +89,8 @@ struct Scenario {
   std::vector<DateJump> jumps;
   std::vector<ClockJump> clock_jumps;
   std::optional<DiskTrouble> disk;
-  std::optional<PowerCut> power_cut;
+  std::optional<PowerCut> power_cut, cut_again;  // Again: from when the run was gone on with.
+  std::optional<Operator> at_console;
   hal::Duration releases_after{};  // A person releases a robot that has been stopped for so long,
   bool by_button{};                // by the board's button, or as the console does.
 };

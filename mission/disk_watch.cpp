@@ -1,0 +1,29 @@
+#include "mission/disk_watch.hpp"
+
+#include "mission/disk_fault.hpp"
+
+namespace mission {
+
+bool DiskWatch::failed(Part part, const FileError& why, hal::Time now) {
+  const bool was_well = well();
+  if (was_well) since_ = now;
+  of(part) = why;
+  return was_well;
+}
+
+bool DiskWatch::works(Part part) {
+  const bool was_well = well();
+  of(part).reset();
+  return !was_well && well();
+}
+
+std::optional<FaultCode> DiskWatch::fault() const {
+  if (well()) return std::nullopt;
+  return disk_fault((files_ ? files_ : journal_)->code);
+}
+
+std::string DiskWatch::text() const {
+  return well() ? std::string() : fault_text(files_ ? *files_ : *journal_);
+}
+
+}  // namespace mission

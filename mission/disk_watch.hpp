@@ -1,0 +1,41 @@
+// A disk that does not take what a survey has to keep: whether it does now, and for how long it has
+// not. Pure: times are handed in.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "hal/values.hpp"
+#include "mission/faults.hpp"
+#include "mission/files.hpp"
+
+namespace mission {
+
+class DiskWatch {
+ public:
+  // Then nobody waits any more. Shorter than what a drive that is held waits: the disk's reason is
+  // the one to be told.
+  static constexpr hal::Duration kPatience = std::chrono::minutes(5);
+
+  // Each has trouble of its own: scans and decisions, and the journal.
+  enum class Part { files, journal };
+
+  // Both return whether that changes anything: it was well, or it is again.
+  bool failed(Part part, const FileError& why, hal::Time now);
+  bool works(Part part);
+
+  bool well() const { return !files_ && !journal_; }
+  // disk_full, disk_failed, or disk_read_only. Nothing: well. Does not allocate.
+  std::optional<FaultCode> fault() const;
+  std::string text() const;  // "F700-disk-full: cannot write ...", or "" when it is well.
+  bool given_up(hal::Time now) const { return !well() && now - since_ > kPatience; }
+  hal::Duration lasted(hal::Time now) const { return now - since_; }  // The latest trouble.
+
+ private:
+  std::optional<FileError>& of(Part part) { return part == Part::files ? files_ : journal_; }
+
+  std::optional<FileError> files_, journal_;
+  hal::Time since_{};
+};
+
+}  // namespace mission
