@@ -13,7 +13,8 @@ namespace {
 using namespace std::chrono_literals;
 using boost::asio::experimental::awaitable_operators::operator||;
 
-constexpr hal::Duration kAnswer = 3s, kRound = 10s, kTryAgain = 1s, kForget = 50ms;
+constexpr hal::Duration kAnswer = 3s, kRound = 10s, kTryAgain = 1s;
+constexpr hal::Duration kConnectAnew = 300ms;  // A link waits 100 ms before it does.
 constexpr int kFailuresTold = 3;  // In a row: a sensor that restarts is back sooner or later.
 constexpr double kSameAngle_deg = 0.5;
 
@@ -82,7 +83,7 @@ hal::Task<void> OusterAsker::run() {
     // A connection that was not there yet is not ended as soon as it is.
     if (answered || lost_ || !asked_ || !drop_) continue;
     drop_();
-    co_await (discard() || clock_.sleep_for(kForget));
+    co_await (discard() || clock_.sleep_for(kConnectAnew));
   }
 }
 

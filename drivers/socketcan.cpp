@@ -103,6 +103,7 @@ struct SocketCan::State {
   // Loops until stopped.
   static hal::Task<void> follow_interface(std::shared_ptr<State> self);
   static hal::Task<void> pump(std::shared_ptr<State> self);
+  static hal::Task<void> ring(std::shared_ptr<State> self);
 
   hal::Task<void> read_news(stream_descriptor& news);
   hal::Task<void> ask_while_off(stream_descriptor& news);
@@ -119,15 +120,13 @@ struct SocketCan::State {
   void apply_filters();
 
   hal::Task<hal::Result<void>> write(const hal::CanFrame& frame, hal::Time deadline);
-  hal::Task<void> until_changed_or(hal::Time wake) {
-    co_await (clock.sleep_until(wake) || changed.wait());
-  }
+  hal::Task<void> until_changed_or(hal::Time wake);
 
   const CanAddress address;
   asio::any_io_executor executor;
   hal::Clock& clock;
   const std::vector<CanFilter> filters;
-  asio::cancellation_signal stop_following, stop_pumping;
+  asio::cancellation_signal stop_following, stop_pumping, stop_ringing;
 
   Interface interface;
   std::shared_ptr<stream_descriptor> socket;  // Null while the interface is not up.
@@ -135,7 +134,9 @@ struct SocketCan::State {
   bool bus_off = false;
   std::uint32_t controller{};  // The last error frame's byte 1: warning, passive.
   bool loss_untold = false;
-  hal::Wake changed;  // Received, confirmed, up, down.
+  hal::Wake changed;               // Received, confirmed, up, down; or the alarm rang.
+  std::optional<hal::Time> alarm;  // Of the first of those who wait for no longer than that.
+  hal::Wake alarm_set;
 
   boost::circular_buffer<hal::ReceivedFrame> received{kReceivedMax};
   std::uint64_t lost{};
@@ -309,6 +310,29 @@ bool SocketCan::State::passes(const hal::CanFrame& frame) const {
 
 // --- Sending.
 
+// Whoever waits looks again then. One timer for all: one for each frame, to be cancelled as soon as
+// the frame is confirmed, would cost more than the frame.
+hal::Task<void> SocketCan::State::ring(std::shared_ptr<State> self) {
+  for (;;) {
+    while (!self->alarm) co_await self->alarm_set.wait();
+    co_await self->clock.sleep_until(*self->alarm);
+    self->alarm.reset();
+    self->changed.notify();
+  }
+}
+
+hal::Task<void> SocketCan::State::until_changed_or(hal::Time wake) {
+  if (alarm && wake < *alarm) {
+    co_await (clock.sleep_until(wake) || changed.wait());
+    co_return;
+  }
+  if (!alarm) {
+    alarm = wake;
+    alarm_set.notify();
+  }
+  co_await changed.wait();
+}
+
 void SocketCan::State::listen_for(const hal::CanFrame& frame) {
   const std::pair id(frame.id, frame.extended);
   if (filters.empty() || passes(frame) ||
@@ -404,13 +428,17 @@ SocketCan::SocketCan(CanAddress address, const asio::any_io_executor& executor, 
                  asio::bind_cancellation_slot(state_->stop_following.slot(), ended));
   asio::co_spawn(executor, State::pump(state_),
                  asio::bind_cancellation_slot(state_->stop_pumping.slot(), ended));
+  asio::co_spawn(executor, State::ring(state_),
+                 asio::bind_cancellation_slot(state_->stop_ringing.slot(), ended));
 }
 
 SocketCan::~SocketCan() {
   state_->stop_following.emit(asio::cancellation_type::terminal);
   state_->stop_pumping.emit(asio::cancellation_type::terminal);
+  state_->stop_ringing.emit(asio::cancellation_type::terminal);
   state_->lose();
   state_->changed.drop();  // Who waits holds the state, and the state them.
+  state_->alarm_set.drop();
 }
 
 std::vector<Trouble> SocketCan::troubles() const {

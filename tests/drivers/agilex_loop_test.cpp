@@ -404,7 +404,8 @@ TEST_F(AgilexLoop, LosesNoTravelWhileTheCableIsUnplugged) {
 }
 
 // The host's clock and its end of the bus when the process is held up: what is due meanwhile comes
-// at the end of that, timers first, and frames wait with the times at which they arrived.
+// at the end of that, timers first, and frames wait with the times at which they arrived; then
+// they are read one after another, while the timers go on.
 class HeldUp final : public hal::Clock, public hal::CanBus {
  public:
   HeldUp(sim::SimClock& clock, hal::CanBus& bus) : clock_(clock), bus_(bus) {}
@@ -421,7 +422,10 @@ class HeldUp final : public hal::Clock, public hal::CanBus {
   }
   hal::Task<hal::Result<hal::ReceivedFrame>> receive() override {
     auto received = co_await bus_.receive();
-    if (clock_.now() < until_) co_await clock_.sleep_until(until_ + 10us);
+    if (clock_.now() < until_)
+      co_await clock_.sleep_until(until_ + 10us);
+    else if (received && received->stamp < until_)
+      co_await clock_.sleep_for(50us);
     co_return received;
   }
 
