@@ -23,7 +23,7 @@ using Segments = std::vector<WallSegment>;
 constexpr int kBeams = 271;
 constexpr double kHeightM = 0.3;
 
-Segments box(double x_m, double y_m, double width_m, double depth_m) {
+Segments box_walls(double x_m, double y_m, double width_m, double depth_m) {
   const Eigen::Vector2d a(x_m, y_m), b(x_m + width_m, y_m), c(x_m + width_m, y_m + depth_m),
       d(x_m, y_m + depth_m);
   return {{a, b}, {b, c}, {c, d}, {d, a}};
@@ -36,7 +36,7 @@ Segments with(Segments walls, const Segments& more) {
 
 // 30 m x 20 m with a shed, and a buttress.
 Segments courtyard() {
-  return with(with(box(0, 0, 30, 20), box(12, 8, 6, 4)), box(29, 6, 1, 1));
+  return with(with(box_walls(0, 0, 30, 20), box_walls(12, 8, 6, 4)), box_walls(29, 6, 1, 1));
 }
 
 Segments corridor() {
@@ -182,7 +182,7 @@ TEST(ProfileMatch, SaysThatItSeesNoWallsOrOthers) {
   const hal::Pose2 at{{6, 6}, 0};
   const MovingProfile seen = seen_from(courtyard(), at, at, dice);
   EXPECT_FALSE(match_profile(WallMap(Segments{}, WallMapConfig{}), seen, sigmas(1, 5)).match.good);
-  const WallMap others(box(4, 4, 4.5, 5.5), {});
+  const WallMap others(box_walls(4, 4, 4.5, 5.5), {});
   const ProfileMatch found = match_profile(others, seen, sigmas(1, 5));
   EXPECT_FALSE(found.match.good);
   EXPECT_FALSE(found.refused);
@@ -197,7 +197,7 @@ TEST(WallMap, TakesWhatScansShowForWhatIsDrawnBesideIt) {
   std::vector<Eigen::Vector2d> shown_m;
   for (double y_m = 0; y_m <= 20; y_m += 0.1) shown_m.emplace_back(0.2, y_m);
   for (double x_m = 12; x_m <= 18; x_m += 0.1) shown_m.emplace_back(x_m, 8);
-  const WallMap map(box(0, 0, 30, 20), shown_m, {});
+  const WallMap map(box_walls(0, 0, 30, 20), shown_m, {});
   ASSERT_NE(map.nearest({0.1, 10}), nullptr);
   EXPECT_NEAR(map.nearest({0.1, 10})->point_m.x(), 0.2, 0.01);
   EXPECT_NEAR(std::abs(map.nearest({0.1, 10})->normal.x()), 1, 0.02);

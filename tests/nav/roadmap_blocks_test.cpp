@@ -17,8 +17,8 @@ using support::Dice;
 using support::random_area;
 using support::random_point;
 
-constexpr double kRadiusM = 0.5;
-constexpr double kKeepM = kRadiusM - Roadmap::kSlackM;
+constexpr double kBlocksRadiusM = 0.5;
+constexpr double kBlocksKeepM = kBlocksRadiusM - Roadmap::kSlackM;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 struct Obstacle {
@@ -59,7 +59,7 @@ std::vector<char> open_edges(const MedialAxis& graph, const std::vector<Obstacle
   std::vector<char> open;
   for (const auto& e : graph.edges)
     open.push_back(std::none_of(obstacles.begin(), obstacles.end(), [&](const Obstacle& o) {
-      return o.distance_m(segment(graph, e)) < kKeepM;
+      return o.distance_m(segment(graph, e)) < kBlocksKeepM;
     }));
   return open;
 }
@@ -106,8 +106,8 @@ TEST(RoadmapBlocks, CloseExactlyTheRoadsThatComeTooClose) {
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     SCOPED_TRACE(seed);
     Dice dice(seed);
-    const FreeArea area = random_area(dice, {60, 15, 6, 9}, kRadiusM);
-    Roadmap roadmap = Roadmap::build(area, kRadiusM);
+    const FreeArea area = random_area(dice, {60, 15, 6, 9}, kBlocksRadiusM);
+    Roadmap roadmap = Roadmap::build(area, kBlocksRadiusM);
     const auto obstacles = random_obstacles(dice, area, 60);
     std::vector<Obstacle> so_far;
     for (const Obstacle& obstacle : obstacles) {
@@ -131,11 +131,11 @@ TEST(RoadmapBlocks, OrderAndRebuildingMakeNoDifference) {
   for (std::uint64_t seed = 1; seed <= 15; ++seed) {
     SCOPED_TRACE(seed);
     Dice dice(seed);
-    const FreeArea area = random_area(dice, {60, 15, 6, 9}, kRadiusM);
+    const FreeArea area = random_area(dice, {60, 15, 6, 9}, kBlocksRadiusM);
     auto obstacles = random_obstacles(dice, area, 50);
-    Roadmap grown = Roadmap::build(area, kRadiusM);
+    Roadmap grown = Roadmap::build(area, kBlocksRadiusM);
     for (const Obstacle& obstacle : obstacles) obstacle.put_on(grown);
-    Roadmap rebuilt = Roadmap::build(area, kRadiusM);
+    Roadmap rebuilt = Roadmap::build(area, kBlocksRadiusM);
     std::reverse(obstacles.begin(), obstacles.end());
     for (const Obstacle& obstacle : obstacles) obstacle.put_on(rebuilt);
     for (int i = 0; i < 20; ++i) {
@@ -151,7 +151,7 @@ TEST(RoadmapBlocks, OrderAndRebuildingMakeNoDifference) {
       EXPECT_EQ(one->clearance_m, other->clearance_m);
     }
     grown.unblock_all();
-    const Roadmap never = Roadmap::build(area, kRadiusM);
+    const Roadmap never = Roadmap::build(area, kBlocksRadiusM);
     for (std::size_t i = 0; i < never.graph().edges.size(); ++i)
       EXPECT_FALSE(grown.edge_blocked(static_cast<int>(i)));
   }
