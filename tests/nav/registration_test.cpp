@@ -9,8 +9,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "nav/registration/icp.hpp"
 #include "nav/linear.hpp"
+#include "nav/registration/icp.hpp"
 #include "tests/nav/scans.hpp"
 
 namespace {
