@@ -4,6 +4,7 @@
 #include <boost/asio/experimental/awaitable_operators.hpp>
 
 #include "drivers/gnss_demux.hpp"
+#include "drivers/port_search.hpp"
 #include "drivers/recognise.hpp"
 
 namespace drivers {
@@ -60,10 +61,7 @@ hal::Task<void> NmeaGnss::run() {
 }
 
 hal::Task<bool> NmeaGnss::find() {
-  std::vector<int> bauds{baud_};
-  if (set_baud_)
-    for (const int baud : kNmeaBauds)
-      if (baud != baud_) bauds.push_back(baud);
+  const std::vector<int> bauds = rates_to_try(baud_, kNmeaBauds, set_baud_);
   reader_.forget();
   for (const int baud : bauds) {
     if (set_baud_ && !set_baud_(baud)) continue;

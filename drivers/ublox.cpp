@@ -15,9 +15,7 @@ using boost::asio::experimental::awaitable_operators::operator||;
 using boost::asio::experimental::awaitable_operators::operator&&;
 namespace fault = stream_fault;
 
-constexpr hal::Duration kProbe = 500ms;    // MON-VER takes a quarter of a second at 9600 baud.
-constexpr hal::Duration kListen = 1200ms;  // At least, before silence is named: another receiver
-                                           // speaks once a second.
+constexpr hal::Duration kProbe = 500ms;  // MON-VER takes a quarter of a second at 9600 baud.
 constexpr hal::Duration kAck = 1s;
 constexpr int kTries = 3;
 constexpr hal::Duration kPause = 500ms;
@@ -73,23 +71,16 @@ hal::Task<void> Ublox::serve() {
 }
 
 hal::Task<bool> Ublox::find() {
-  std::vector<int> bauds{baud_};
-  if (set_baud_)
-    for (const int baud : kUbloxBauds)
-      if (baud != baud_) bauds.push_back(baud);
+  const std::vector<int> bauds = rates_to_try(baud_, kUbloxBauds, set_baud_);
   reader_.forget();
-  const hal::Time listened = clock_.now() + kListen;
-  do {
-    for (const int baud : bauds) {
-      const Found found = co_await find_at(baud);
-      if (found != Found::nothing) co_return found == Found::ours;
-    }
-  } while (clock_.now() < listened);
+  const std::function<hal::Task<Found>(int)> ask_at = [this](int baud) { return find_at(baud); };
+  const Found found = co_await search_port(clock_, bauds, ask_at);
+  if (found != Found::nothing) co_return found == Found::ours;
   if (!output_.troubles().has(fault::kGone)) name_silence();
   co_return false;
 }
 
-hal::Task<Ublox::Found> Ublox::find_at(int baud) {
+hal::Task<Found> Ublox::find_at(int baud) {
   if (set_baud_ && !set_baud_(baud)) {
     co_await clock_.sleep_for(kProbe);
     co_return Found::nothing;

@@ -3,6 +3,7 @@
 
 #include "drivers/device.hpp"
 #include "drivers/gnss_output.hpp"
+#include "drivers/port_search.hpp"
 #include "drivers/ublox_startup.hpp"
 #include "hal/devices.hpp"
 
@@ -43,7 +44,6 @@ class Ublox final : public hal::Gnss, public Device {
 
  private:
   hal::Task<void> serve();
-  enum class Found : std::uint8_t { nothing, other, ours };
   hal::Task<bool> find();
   hal::Task<Found> find_at(int baud);
   hal::Task<bool> configure(bool found);

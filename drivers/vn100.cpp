@@ -13,10 +13,8 @@ using namespace std::chrono_literals;
 using boost::asio::experimental::awaitable_operators::operator||;
 namespace fault = stream_fault;
 
-constexpr hal::Duration kProbe = 200ms;    // For an answer at the right rate.
-constexpr hal::Duration kListen = 1200ms;  // At least, before silence is named: a receiver speaks
-                                           // once a second.
-constexpr hal::Duration kAnswer = 300ms;   // While it streams, answers queue behind packets.
+constexpr hal::Duration kProbe = 200ms;   // For an answer at the right rate.
+constexpr hal::Duration kAnswer = 300ms;  // While it streams, answers queue behind packets.
 constexpr int kTries = 3;
 constexpr hal::Duration kPause = 500ms;   // Between two starts.
 constexpr hal::Duration kGiveUp = 1s;     // Without a new sample: it may have been reset.
@@ -66,23 +64,16 @@ hal::Task<void> Vn100::serve() {
 
 // At the rate of its last answer first: after a loss it is there most likely.
 hal::Task<bool> Vn100::find() {
-  std::vector<int> bauds{baud_};
-  if (set_baud_)
-    for (const int baud : kVn100Bauds)
-      if (baud != baud_) bauds.push_back(baud);
+  const std::vector<int> bauds = rates_to_try(baud_, kVn100Bauds, set_baud_);
   reader_.forget();
-  const hal::Time listened = clock_.now() + kListen;
-  do {
-    for (const int baud : bauds) {
-      const Found found = co_await find_at(baud);
-      if (found != Found::nothing) co_return found == Found::ours;
-    }
-  } while (clock_.now() < listened);
+  const std::function<hal::Task<Found>(int)> ask_at = [this](int baud) { return find_at(baud); };
+  const Found found = co_await search_port(clock_, bauds, ask_at);
+  if (found != Found::nothing) co_return found == Found::ours;
   name_silence();
   co_return false;
 }
 
-hal::Task<Vn100::Found> Vn100::find_at(int baud) {
+hal::Task<Found> Vn100::find_at(int baud) {
   if (set_baud_ && !set_baud_(baud)) {
     co_await clock_.sleep_for(kProbe);
     co_return Found::nothing;

@@ -3,8 +3,8 @@
 
 #include "drivers/clock_fit.hpp"
 #include "drivers/device.hpp"
-#include "drivers/frame_reader.hpp"
 #include "drivers/outbox.hpp"
+#include "drivers/port_search.hpp"
 #include "drivers/stream_health.hpp"
 #include "drivers/vn100_startup.hpp"
 #include "hal/devices.hpp"
@@ -41,7 +41,6 @@ class Vn100 final : public hal::Imu, public Device {
 
  private:
   hal::Task<void> serve();
-  enum class Found : std::uint8_t { nothing, other, ours };
   hal::Task<bool> find();
   hal::Task<Found> find_at(int baud);
   hal::Task<bool> configure();

@@ -15,7 +15,7 @@ vantage_together(vantage_drivers drivers
   "flir_ptu link_trouble ouster peers tcp_stream"
   "hokuyo real_clock socketcan usb_events velodyne"
   "frame_reader gs_usb gs_usb_adapter sick_lms"
-  "agilex_drive gnss_output gpsd_client serial_port"
+  "agilex_drive gnss_output gpsd_client port_search serial_port"
   "profile_loop profile_stream udp_port udp_scanner"
   "power_io signal stream_health ublox"
   "cia402_drive cia402_troubles sweep_scanner vn100"
