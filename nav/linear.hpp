@@ -16,7 +16,7 @@ Axes<2> axes_of(const Eigen::Matrix2d& symmetric);
 Axes<3> axes_of(const Eigen::Matrix3d& symmetric);
 Axes<6> axes_of(const Eigen::Matrix<double, 6, 6>& symmetric);
 
-// Of a regular matrix; else what comes is not finite.
+// Of a regular matrix; of another the result is of no use, and may not be finite.
 Eigen::Matrix<double, 6, 6> inverse_of(const Eigen::Matrix<double, 6, 6>& regular);
 
 }  // namespace nav

@@ -44,16 +44,19 @@ class SmallSite {
         mission::WorldUse::world);
   }
   // Runs the mission; `watch` may break something as time goes on.
-  mission::RunOutcome run(const std::function<void(mission::SimBackend&)>& watch = {}) const {
+  mission::RunOutcome run(const std::function<void(mission::SimBackend&)>& watch = {},
+                          bool resume = false) const {
     mission::Prepared ready = prepared();
     for (const auto& error : ready.errors) ADD_FAILURE() << error.text();
     return mission::run_in_simulation(ready, {.out = out(),
+                                              .resume = resume,
                                               .judge_cells = {},
                                               .threads = 1,
                                               .progress = nullptr,
                                               .terminal = false,
                                               .watch = watch});
   }
+  mission::RunOutcome go_on() const { return run({}, true); }  // With a run that was cut.
   std::filesystem::path out() const { return folder_.path() / "run"; }
   std::filesystem::path folder() const { return folder_.path(); }
   std::string summary() const {

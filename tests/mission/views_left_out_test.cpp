@@ -29,16 +29,7 @@ class DividedYard {
         << "choose = \"" << choose << "\"\n";
   }
 
-  RunOutcome run(bool resume = false) const {
-    mission::Prepared ready = site_.prepared();
-    for (const auto& error : ready.errors) ADD_FAILURE() << error.text();
-    return mission::run_in_simulation(ready, {.out = site_.out(),
-                                              .resume = resume,
-                                              .judge_cells = {},
-                                              .threads = 1,
-                                              .progress = nullptr,
-                                              .terminal = false});
-  }
+  RunOutcome run(bool resume = false) const { return resume ? site_.go_on() : site_.run(); }
   std::vector<boost::json::value> decisions(const std::string& kind) const {
     std::ifstream file(site_.out() / "decisions.jsonl");
     std::vector<boost::json::value> all;
