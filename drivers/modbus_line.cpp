@@ -58,7 +58,8 @@ bool is_possible(const ModbusRequest& request) {
 
 }  // namespace
 
-void ModbusLine::Close::operator()(_modbus* context) const {
+void ModbusLine::Close::operator()(_modbus* context) {
+  if (std::exchange(locked, false)) unlock_port(modbus_get_socket(context));
   modbus_close(context);
   modbus_free(context);
 }
@@ -127,6 +128,7 @@ int ModbusLine::prepare_port() {
   if (rtu == nullptr) return 0;
   const int port = modbus_get_socket(context_.get());
   if (const error_code error = lock_port(port)) return error.value();
+  context_.get_deleter().locked = true;
   return apply_settings(port, rtu->line).value();
 }
 

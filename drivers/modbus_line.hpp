@@ -36,7 +36,8 @@ class ModbusLine {
 
  private:
   struct Close {
-    void operator()(_modbus* context) const;
+    void operator()(_modbus* context);
+    bool locked;  // Its serial port, for us alone. At first not: it is value-initialised.
   };
 
   // errno, or 0.

@@ -35,27 +35,52 @@ void ask_for_low_latency(int port) {
   ioctl(port, TIOCSSERIAL, &serial);
 }
 
-error_code prepare(int port, const SerialLine& line) {
-  if (const error_code error = lock_port(port)) return error;
-  if (const error_code error = apply_settings(port, line)) return error;
-  ask_for_low_latency(port);
+// Locked for us alone as long as it is open.
+class LockedPort : public stream_descriptor {
+ public:
+  using stream_descriptor::stream_descriptor;
+  ~LockedPort() { unlock(); }
+
+  error_code lock() {
+    const error_code error = lock_port(native_handle());
+    locked_ = !error;
+    return error;
+  }
+  void close(error_code& error) {
+    unlock();
+    stream_descriptor::close(error);
+  }
+
+ private:
+  void unlock() {
+    if (std::exchange(locked_, false)) unlock_port(native_handle());
+  }
+
+  bool locked_ = false;  // Who did not lock it leaves it to whoever did.
+};
+
+error_code prepare(LockedPort& port, const SerialLine& line) {
+  if (const error_code error = port.lock()) return error;
+  if (const error_code error = apply_settings(port.native_handle(), line)) return error;
+  ask_for_low_latency(port.native_handle());
   return {};
 }
 
 }  // namespace
 
-struct SerialPort::State : KeptStream<stream_descriptor> {
+struct SerialPort::State : KeptStream<LockedPort> {
   using KeptStream::KeptStream;
 };
 
 namespace {
 
-hal::Task<KeptStream<stream_descriptor>::Opened> open_port(SerialLine line, std::string address) {
+hal::Task<KeptStream<LockedPort>::Opened> open_port(SerialLine line, std::string address) {
   const auto executor = co_await boost::asio::this_coro::executor;
   const int port = ::open(line.path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
   if (port < 0) co_return trouble_of({errno, boost::system::system_category()}, address, line.path);
-  auto stream = std::make_shared<stream_descriptor>(executor, port);
-  if (const error_code error = prepare(port, line)) co_return trouble_of(error, address, line.path);
+  auto stream = std::make_shared<LockedPort>(executor, port);
+  if (const error_code error = prepare(*stream, line))
+    co_return trouble_of(error, address, line.path);
   co_return stream;
 }
 

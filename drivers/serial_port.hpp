@@ -44,7 +44,11 @@ boost::system::error_code apply_settings(int port, const SerialLine& line);
 // The speed that a port is set to, in baud; of a pseudo terminal also from its master's end. 0: it
 // is no port.
 std::uint32_t speed_of(int port);
-// So that nobody else opens it or talks in between; ends when it is closed.
+// So that nobody else opens it or talks in between. Closing it is not enough to end that: the
+// kernel keeps a port for one alone until everybody has closed it, and of a pseudo terminal its
+// other end may hold it open for ever.
 boost::system::error_code lock_port(int port);
+// Before a port is closed that lock_port() has locked.
+void unlock_port(int port);
 
 }  // namespace drivers

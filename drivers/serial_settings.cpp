@@ -89,4 +89,9 @@ error_code lock_port(int port) {
   return {};
 }
 
+void unlock_port(int port) {
+  ioctl(port, TIOCNXCL);
+  flock(port, LOCK_UN);
+}
+
 }  // namespace drivers

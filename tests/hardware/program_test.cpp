@@ -1,8 +1,12 @@
 // `vantaged` on hardware, as a person starts it; `vantage-units` is the hardware. There is no CAN
 // here: what a whole mission does, tests/kernel asks.
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <signal.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
 #include <filesystem>
 #include <sstream>
@@ -92,6 +96,15 @@ class WaitingHardware : public Hardware {
     std::this_thread::sleep_for(500ms);
     make_yard("[drive]\nlink = \"can:vantage9\"\n" + links());
   }
+  bool is_for_one_alone(const std::string& port) const {
+    const std::string path = (folder_.path() / "ports" / port).string();
+    const int look = open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK);
+    if (look < 0) return errno == EBUSY;
+    int exclusive = 0;
+    EXPECT_EQ(ioctl(look, TIOCGEXCL, &exclusive), 0);
+    close(look);
+    return exclusive != 0;
+  }
   void TearDown() override {
     const int pid = std::atoi(test::read_text(folder_.path() / "pid").c_str());
     if (pid > 0) kill(pid, SIGTERM);
@@ -106,6 +119,8 @@ TEST_F(WaitingHardware, SaysWhatItWaitsForAndStopsForASignal) {
     EXPECT_THAT(outcome.err.substr(outcome.err.rfind("waits for")), Not(HasSubstr(role)));
   EXPECT_THAT(outcome.out, HasSubstr("NOT completed: stopped by SIGTERM"));
   EXPECT_TRUE(std::filesystem::exists(run_folder() + "/report.html"));
+  // The units hold their ports open: what the program locked has to be open to the next one's user.
+  for (const char* name : {"pan", "imu", "gnss"}) EXPECT_FALSE(is_for_one_alone(name)) << name;
 }
 
 // As `timeout` without --foreground does it, or a terminal whose shell hands the signal on.

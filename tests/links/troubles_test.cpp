@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <cerrno>
 #include <filesystem>
 #include <fstream>
 
@@ -75,6 +76,60 @@ TEST_F(Troubles, APortThatAnotherProgramHolds) {
   ASSERT_TRUE(first.connected());
   drivers::SerialPort second({path, 9600}, executor, loop.clock());
   expect(second, LinkFault::busy, "held by this program itself");
+}
+
+// Whether nobody but root may open the port.
+bool is_for_one_alone(const std::string& path) {
+  const int look = open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK);
+  if (look < 0) return errno == EBUSY;
+  int exclusive = 0;
+  EXPECT_EQ(ioctl(look, TIOCGEXCL, &exclusive), 0);
+  close(look);
+  return exclusive != 0;
+}
+
+// A pseudo terminal's other end holds it open for longer than anybody who uses it.
+TEST_F(Troubles, APortThatWasClosedIsThereForOthers) {
+  drivers::PtyPeer peer(path, executor, loop.clock());
+  pass(50ms);
+  ASSERT_FALSE(is_for_one_alone(path));
+  {
+    drivers::SerialPort port({path, 9600}, executor, loop.clock());
+    pass(50ms);
+    ASSERT_TRUE(port.connected());
+    EXPECT_TRUE(is_for_one_alone(path));
+    // Who could not have it does not open it to others either.
+    {
+      drivers::SerialPort second({path, 9600}, executor, loop.clock());
+      pass(50ms);
+    }
+    EXPECT_TRUE(is_for_one_alone(path));
+  }
+  pass(50ms);
+  EXPECT_FALSE(is_for_one_alone(path));
+}
+
+TEST_F(Troubles, APortThatDidNotTakeItsSettingsIsThereForOthers) {
+  drivers::PtyPeer peer(path, executor, loop.clock());
+  pass(50ms);
+  drivers::SerialPort port({path, 9600, 'E', 1}, executor, loop.clock());
+  expect(port, LinkFault::bad_settings, "@9600E");
+  EXPECT_FALSE(is_for_one_alone(path));
+}
+
+TEST_F(Troubles, APortOfAModbusIsThereForOthersWhenItWasClosed) {
+  drivers::PtyPeer peer(path, executor, loop.clock());
+  pass(50ms);
+  {
+    drivers::ModbusBus bus(drivers::ModbusRtuAddress{{path, 9600}, 1}, executor, loop.clock());
+    const auto ask = [&]() -> hal::Task<void> {
+      EXPECT_FALSE(co_await bus.unit(1).read_coils({0, 1})) << "nobody answers";
+    };
+    loop.run(ask());
+    EXPECT_TRUE(is_for_one_alone(path));
+  }
+  pass(50ms);
+  EXPECT_FALSE(is_for_one_alone(path));
 }
 
 TEST_F(Troubles, ANewHolderIsNamedByItsProcess) {
