@@ -1,0 +1,151 @@
+// gate_lateness: how late the gate wakes up on this machine while plans are made on all of its
+// processors.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/io_context.hpp>
+#include <cmath>
+#include <cstdio>
+#include <thread>
+#include <vector>
+
+#include "drivers/real_clock.hpp"
+#include "mission/gated_drive.hpp"
+#include "mission/main_command_line.hpp"
+#include "mission/main_realtime.hpp"
+#include "mission/main_run.hpp"
+
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr int kInTime = 0, kLate = 1, kRefused = 2;
+constexpr hal::Duration kSettles = 500ms;  // Before it counts.
+
+struct Options {
+  std::filesystem::path mission;
+  int seconds = 60, planners = 0;
+  double max_ms = 5;
+};
+
+struct Lateness {
+  // What the machine refused; empty: the gate runs before everything else, as in a service.
+  std::string refusal;
+  std::vector<hal::Duration> late;  // Of each cycle, sorted.
+  int plans{};                      // That were finished meanwhile.
+
+  // So late, or less, was that share of all cycles.
+  hal::Duration share(double share) const {
+    if (late.empty()) return hal::Duration::max();
+    const double last = std::ceil(share * static_cast<double>(late.size())) - 1;
+    return late[static_cast<std::size_t>(std::max(0.0, last))];
+  }
+};
+
+double ms(hal::Duration span) {
+  return 1e3 * hal::seconds(span);
+}
+
+// Always well, and obeys: what is late here is nobody's but the gate's.
+class WillingDrive final : public hal::GuardedDrive {
+ public:
+  explicit WillingDrive(hal::Clock& clock) : clock_(clock) {}
+  hal::Task<hal::Result<void>> command(hal::Twist) override { co_return hal::Result<void>{}; }
+  hal::Task<hal::Result<hal::WheelTravel>> next_travel() override {
+    co_await clock_.sleep_for(1h);
+    co_return hal::WheelTravel{};
+  }
+  hal::DriveStatus status() const override {
+    hal::DriveStatus status;
+    status.reported_at = clock_.now();
+    status.silent = status.held = false;
+    return status;
+  }
+  hal::Task<hal::Result<hal::Duration>> prove_timeout() override { co_return hal::Duration(500ms); }
+
+ private:
+  hal::Clock& clock_;
+};
+
+// Its cycles, each against when it was due: a period after the one before.
+void run_gate(hal::Duration during, Lateness& found) {
+  for (const std::string& refusal : {mission::lock_memory(), mission::run_first()})
+    if (!refusal.empty()) found.refusal += (found.refusal.empty() ? "" : "; ") + refusal;
+  boost::asio::io_context io{1};
+  drivers::RealClock clock;
+  WillingDrive drive(clock);
+  const hal::Time from = clock.now() + kSettles, until = from + during;
+  found.late.reserve(static_cast<std::size_t>(during / mission::kGatePeriod) + 10);
+  hal::Time due{};
+  mission::GatedDrive::Config config;
+  config.alive = [&] {
+    const hal::Time now = clock.now();
+    if (due == hal::Time{} || now < due) due = now;  // It was due no later than it came.
+    if (now >= from && found.late.size() < found.late.capacity()) found.late.push_back(now - due);
+    due = std::max(due + mission::kGatePeriod, now);
+    if (now >= until) io.stop();
+  };
+  mission::GatedDrive gate(config, clock, drive);
+  boost::asio::co_spawn(io, gate.run(), [](std::exception_ptr problem) {
+    if (problem) std::rethrow_exception(problem);
+  });
+  io.run();
+}
+
+// On an event loop of its own, beside threads that make the mission's plan over and over.
+Lateness measure(const Options& options, const mission::Prepared& prepared) {
+  Lateness found;
+  std::atomic<bool> over = false;
+  std::atomic<int> plans = 0;
+  std::vector<std::jthread> planners;
+  for (int i = 0; i < options.planners; ++i)
+    planners.emplace_back([&] {
+      for (; !over; ++plans)
+        (void)mission::plan_areas(prepared.config, prepared.site.map, prepared.tasks, 1);
+    });
+  std::thread([&] { run_gate(std::chrono::seconds(options.seconds), found); }).join();
+  over = true;
+  planners.clear();
+  found.plans = plans;
+  std::ranges::sort(found.late);
+  return found;
+}
+
+int run(const Options& options) {
+  const mission::Prepared prepared = mission::prepare(options.mission, {}, mission::WorldUse::none);
+  for (const auto& error : prepared.errors) fmt::print(stderr, "{}\n", error.text());
+  if (!prepared.errors.empty()) return kRefused;
+  const Lateness found = measure(options, prepared);
+  fmt::print(
+      "the gate woke up late by: p50 {:.3f} ms, p99 {:.3f} ms, p99.9 {:.3f} ms, at most {:.3f} ms; "
+      "{} cycles beside {} threads, which made {} plans\n",
+      ms(found.share(0.5)), ms(found.share(0.99)), ms(found.share(0.999)), ms(found.share(1)),
+      found.late.size(), options.planners, found.plans);
+  if (!found.refusal.empty()) {
+    fmt::print("nothing is asked of it here: {}\n", found.refusal);
+    return kInTime;
+  }
+  return ms(found.share(0.999)) <= options.max_ms ? kInTime : kLate;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  mission::CommandLine line(
+      "How late the gate wakes up on this machine while plans are made on all of its processors.",
+      "Exit: 0 p99.9 is within --max-ms, or the machine permits no real-time priority, 1 it is "
+      "not,\n2 refused to start.");
+  line.add("mission", &options.mission, "Mission file (TOML) that is planned meanwhile",
+           {.required = true});
+  line.add("--seconds", &options.seconds, "How long",
+           {.within = {{1, 86400}}, .shows_default = true});
+  line.add("--planners", &options.planners, "Threads that plan (0: one for each processor)",
+           {.within = {{0, 256}}});
+  line.add("--max-ms", &options.max_ms, "What is asked of p99.9", {.shows_default = true});
+  if (!line.parse(argc, argv)) return line.asked_for_help() ? kInTime : kRefused;
+  options.planners = mission::threads_or_all(options.planners);
+  return run(options);
+}
