@@ -10,6 +10,7 @@
 #include "drivers/agilex_drive.hpp"
 #include "drivers/cia402_drive.hpp"
 #include "drivers/real_clock.hpp"
+#include "mission/disk_watch.hpp"
 #include "sim/agilex_unit.hpp"
 #include "sim/cia402_unit.hpp"
 #include "tests/drivers/allocations.hpp"
@@ -371,6 +372,54 @@ TEST_F(GatedSurroundings, HoldForAFaultOfADeviceUntilItIsOver) {
   around.hold_fault.reset();
   wait(1s);
   EXPECT_GT(world.rolling().forward_mps, 0.39);
+}
+
+// However the disk fails: the robot stands at once, says so, and goes on by itself.
+TEST_F(GatedSurroundings, HoldWhileTheDiskFailsAndUntilAllOfItWorks) {
+  using Part = mission::DiskWatch::Part;
+  drive_there();
+  mission::DiskWatch disk;
+  gate->watch_surroundings([&] {
+    mission::Surroundings is = around;
+    is.hold_fault = disk.fault();
+    return is;
+  });
+  const auto fails = [&](Part part, errc::errc_t why) {
+    disk.failed(part, {"scans/0003.ply", "write", errc::make_error_code(why)}, clock.now());
+  };
+  wait(1s);
+  ASSERT_GT(world.rolling().forward_mps, 0.39) << "a disk that is well holds nothing";
+  const hal::Time began = clock.now();
+  fails(Part::files, errc::no_space_on_device);
+  wait(500ms);
+  ASSERT_TRUE(zero_after(began));
+  EXPECT_LE(*zero_after(began) - began, mission::kGatePeriod + kFrameTime);
+  EXPECT_EQ(moving_after(*zero_after(began)), 0);
+  EXPECT_EQ(gate->mode(), Mode::holding);
+  EXPECT_EQ(gate->held_by(), FaultCode::disk_full);
+  EXPECT_THAT(told, Contains(HasSubstr("the robot holds: F700-disk-full")));
+  EXPECT_EQ(told_mission.back(), errc::operation_not_permitted);
+  fails(Part::journal, errc::io_error);
+  disk.works(Part::files);
+  wait(500ms);
+  EXPECT_EQ(gate->held_by(), FaultCode::disk_failed) << "the journal does not work yet";
+  EXPECT_NEAR(world.rolling().forward_mps, 0, 0.01);
+  disk.works(Part::journal);
+  wait(1s);
+  EXPECT_TRUE(gate->released());
+  EXPECT_GT(world.rolling().forward_mps, 0.39) << "nobody has to release it";
+}
+
+TEST_F(GatedSurroundings, HoldForADiskOnlyWhereNothingStops) {
+  drive_there();
+  around.hold_fault = FaultCode::disk_full;
+  wait(500ms);
+  gate->ask_hold();
+  around.hold_fault.reset();
+  const hal::Time mended = clock.now();
+  wait(1s);
+  EXPECT_EQ(moving_after(mended), 0) << "a person's hold outlives it";
+  EXPECT_FALSE(gate->released());
 }
 
 TEST_F(GatedSurroundings, HoldWhenTheRangeSourceIsSilentFor250ms) {
