@@ -2,7 +2,10 @@
 // hold is in rig/judge.
 #include "tests/dst/rig/operator.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
+
+#include <algorithm>
 
 #include "tests/dst/rig/mission.hpp"
 
@@ -93,6 +96,48 @@ TEST(Operator, IsFoundOutByTheJudgeWhenNobodyShouldBeLoggedIn) {
       run_with(typing({{8s, "login\rcorrect"}, {9s, " horse\r"}, {15s, "skip\r"}}));
   ASSERT_TRUE(outcome.violation);
   EXPECT_THAT(outcome.violation->invariant, HasSubstr("nobody is logged in"));
+}
+
+std::string set_password() {
+  return fmt::format("set-password\r{0}\r{0}\r", dst::kNewPassword);
+}
+
+TEST(Operator, ThatSetsAnotherPasswordLogsEverybodyOutAndTheOldOneNoLongerCounts) {
+  const dst::Outcome outcome = run_with(typing(
+      {{8s, kLogin}, {10s, set_password()}, {14s, "home\r"}, {16s, kLogin}, {18s, "home\r"}}));
+  EXPECT_FALSE(outcome.violation) << dst::report(0, *outcome.violation);
+  EXPECT_TRUE(outcome.password_set);
+  EXPECT_TRUE(outcome.completed) << outcome.end;
+  const std::string login = fmt::format("login\r{}\r", dst::kNewPassword);
+  const dst::Outcome anew =
+      run_with(typing({{8s, kLogin}, {10s, set_password()}, {14s, login}, {18s, "home\r"}}));
+  EXPECT_FALSE(anew.violation) << dst::report(0, *anew.violation);
+  EXPECT_THAT(anew.end, HasSubstr("sent home by the operator"));
+}
+
+// To the judge, whoever was logged in before the password was set is so no more.
+TEST(Operator, IsFoundOutByTheJudgeWhenALoginOutlivesItsPassword) {
+  const dst::Outcome outcome = run_with(typing({{8s, kLogin},
+                                                {10s, set_password()},
+                                                {14s, "login\rbattery"},
+                                                {15s, " staple\r"},
+                                                {18s, "skip\r"}}));
+  ASSERT_TRUE(outcome.violation);
+  EXPECT_THAT(outcome.violation->invariant, HasSubstr("nobody is logged in"));
+}
+
+TEST(Operator, SetsAnotherPasswordInSomeOfTheRandomMissions) {
+  int there = 0, set = 0;
+  for (std::uint64_t seed = 1; there < 8; ++seed) {
+    const auto who = dst::draw_scenario(seed).at_console;
+    const auto sets = [](const Typed& typed) { return typed.bytes == set_password(); };
+    if (!who || std::ranges::none_of(who->typed, sets)) continue;
+    ++there;
+    const dst::Outcome outcome = dst::run_seed(seed);
+    EXPECT_FALSE(outcome.violation) << dst::report(seed, *outcome.violation);
+    set += outcome.password_set;
+  }
+  EXPECT_GE(set, 2);
 }
 
 TEST(Operator, TypesTheSameForTheSameSeed) {

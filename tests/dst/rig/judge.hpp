@@ -42,6 +42,8 @@ class Judge {
   void on_release();
   // The right password is typed at a console: from now on somebody may be logged in there.
   void on_password() { password_typed_ = true; }
+  // Another password counts from now on, and nobody is logged in any more.
+  void on_password_set() { password_typed_ = false; }
   // A console has the robot do something.
   void on_order(const mission::ConsoleOrder& order);
   // At the end of each instant: nothing can run any more before time moves.

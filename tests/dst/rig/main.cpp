@@ -65,17 +65,15 @@ int run(const Asked& asked) {
   return sums.violated > 0 ? 1 : 0;
 }
 
-int matrix(const std::string& only) {
+int matrix(const std::string& only, bool verbose) {
   int odd = 0;
   for (const dst::Cell& cell : dst::matrix()) {
     if (!only.empty() && only != std::string(cell.role) + ":" + std::string(cell.fault)) continue;
     const dst::Outcome outcome = dst::run_cell(cell);
     const std::string objection = dst::objection(cell, outcome);
     std::fputs(dst::row(cell, outcome).c_str(), stdout);
-    if (!objection.empty()) {
-      fmt::print("  not as expected: {}\n", objection);
-      tell(outcome);
-    }
+    if (!objection.empty()) fmt::print("  not as expected: {}\n", objection);
+    if (!objection.empty() || verbose) tell(outcome);
     odd += !objection.empty();
   }
   fmt::print("{} cells, {} not as expected\n", dst::matrix().size(), odd);
@@ -102,7 +100,7 @@ int main(int argc, char** argv) {
   line.add("--missions", &asked.missions, "how many, with seeds one after the other",
            {.within = {{1, 100'000'000}}, .shows_default = true});
   line.add("--jobs", &asked.jobs, "threads", {.within = {{1, 256}}, .shows_default = true});
-  line.add("--verbose", &asked.verbose, "a line for each mission");
+  line.add("--verbose", &asked.verbose, "a line for each mission; of a cell of the matrix all");
   line.add("--matrix", &asked.matrix, "every fault of every device once, with its reaction");
   line.add("--cell", &asked.cell, "of the matrix only this one: \"imu:slow\"");
   line.add("--soak-hours", &asked.soak_hours,
@@ -110,6 +108,6 @@ int main(int argc, char** argv) {
   line.add("--replay", &asked.replay, "run this one seed, and tell all");
   if (!line.parse(argc, argv)) return line.exit_code();
   if (asked.replay) return replay(*asked.replay);
-  if (asked.matrix) return matrix(asked.cell);
+  if (asked.matrix) return matrix(asked.cell, asked.verbose);
   return asked.soak_hours > 0 ? soak(asked.seed, asked.soak_hours) : run(asked);
 }

@@ -376,6 +376,7 @@ Outcome Mission::outcome() {
   outcome_.decisions = last_lines(begin_.folder / "decisions.jsonl");
   outcome_.frames_hash = judge_.frames_hash();
   if (operator_) outcome_.console_hash = operator_->hash();
+  if (operator_) outcome_.password_set = operator_->password_set();
   outcome_.stops = judge_.stops();
   outcome_.slowest_stop = judge_.slowest_stop();
   if (!outcome_.violation) outcome_.violation = judge_.violation();
@@ -449,6 +450,7 @@ void add(Outcome& sum, const Outcome& next) {
   sum.console_hash ^= first.console_hash * 3;
   sum.named.insert(first.named.begin(), first.named.end());
   sum.held |= first.held;
+  sum.password_set |= first.password_set;
   sum.resumed = first.resumed + 1;
 }
 

@@ -29,7 +29,8 @@ struct Outcome {
   hal::Duration slowest_stop{};
   // What the operator could read while it ran, where Options::observe: "imu: silent", "F001-...".
   std::set<std::string> named;
-  bool held{};  // The robot was stopped, or stood for a missing device.
+  bool held{};          // The robot was stopped, or stood for a missing device.
+  bool password_set{};  // Somebody gave the console another password.
 
   // Equal for equal traces.
   bool same_trace(const Outcome& other) const {

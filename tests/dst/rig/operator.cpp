@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <boost/asio/co_spawn.hpp>
 #include <fstream>
+#include <functional>
 #include <utility>
 
 #include "mission/gate.hpp"
@@ -101,8 +102,8 @@ void draw_drive(Dice& dice, hal::Duration at, std::vector<Operator::Typed>& type
   typed.push_back({at, std::string(kEnds[static_cast<std::size_t>(dice.below(std::size(kEnds)))])});
 }
 
-std::string login() {
-  return fmt::format("login\r{}\r", kPassword);
+std::string login(std::string_view password = kPassword) {
+  return fmt::format("login\r{}\r", password);
 }
 
 void draw_sitting(Dice& dice, Operator& who, hal::Duration at) {
@@ -114,18 +115,25 @@ void draw_sitting(Dice& dice, Operator& who, hal::Duration at) {
   draw_drive(dice, at, who.typed);
 }
 
-// Of which the line would make a login, whoever sent it.
-bool gives_password(const std::string& typed) {
-  return typed.find(kPassword) != std::string::npos;
+// Gives the console another password, and mostly logs in with it.
+void draw_new_password(Dice& dice, double within_s, std::vector<Operator::Typed>& typed) {
+  const hal::Duration at = hal::from_seconds(dice.uniform(0, within_s));
+  typed.push_back({at, login()});
+  typed.push_back({at + 1s, fmt::format("set-password\r{0}\r{0}\r", kNewPassword)});
+  if (dice.below(4) != 0)
+    typed.push_back({at + 6s + hal::from_seconds(dice.uniform(0, 20)), login(kNewPassword)});
 }
 
 // What the console has the robot do, as the judge hears it.
 class Overheard final : public mission::ConsoleRobot {
  public:
-  Overheard(mission::ConsoleRobot& robot, Judge& judge) : robot_(robot), judge_(judge) {}
+  // `look`: at what became of the password, before the judge hears of an order.
+  Overheard(mission::ConsoleRobot& robot, Judge& judge, std::function<void()> look)
+      : robot_(robot), judge_(judge), look_(std::move(look)) {}
   mission::ConsoleFacts facts() const override { return robot_.facts(); }
   std::vector<std::string> log(std::size_t lines) const override { return robot_.log(lines); }
   std::string obey(const mission::ConsoleOrder& order) override {
+    look_();
     judge_.on_order(order);
     return robot_.obey(order);
   }
@@ -133,6 +141,7 @@ class Overheard final : public mission::ConsoleRobot {
  private:
   mission::ConsoleRobot& robot_;
   Judge& judge_;
+  std::function<void()> look_;
 };
 
 std::filesystem::path make_password(const std::filesystem::path& folder) {
@@ -167,17 +176,33 @@ Operator draw_operator(Dice& dice, double within_s) {
     who.cut_from = hal::from_seconds(dice.uniform(0, within_s));
     who.cut_during = hal::from_seconds(dice.uniform(0.05, 20));
   }
+  if (who.knows_password && dice.below(3) == 0) {
+    draw_new_password(dice, within_s, who.typed);
+    std::ranges::stable_sort(who.typed, {}, &Operator::Typed::at);
+  }
   return who;
 }
 
 struct OperatorAtConsole::Console {
   Console(const Parts& parts, const std::filesystem::path& folder)
-      : robot({parts.survey.gate(), parts.survey.survey(), parts.drivers, {}}),
-        overheard(robot, parts.judge),
+      : judge(parts.judge),
+        robot({parts.survey.gate(), parts.survey.survey(), parts.drivers, {}}),
+        overheard(robot, judge, [this] { look_at_password(); }),
         hub({.password = make_password(folder), .first_number = [] { return 1000U; }}, parts.clock,
             overheard, parts.compute),
         person(parts.io, parts.clock, hub, console_test::kAtTheLine) {}
 
+  // Once it was set only the new one logs anybody in, and whoever was logged in is so no more.
+  void look_at_password() {
+    if (password_set) return;
+    for (const std::string& line : hub.log(mission::ConsoleHub::kLogMax))
+      password_set |= line.ends_with("the password was set");
+    if (password_set) judge.on_password_set();
+  }
+  std::string_view password() const { return password_set ? kNewPassword : kPassword; }
+
+  Judge& judge;
+  bool password_set = false;
   mission::RobotConsole robot;
   Overheard overheard;
   mission::ConsoleHub hub;
@@ -210,8 +235,15 @@ void OperatorAtConsole::begin() {
   boost::asio::co_spawn(parts_.io, helps(), pass_on);
 }
 
+bool OperatorAtConsole::password_set() const {
+  console_->look_at_password();
+  return console_->password_set;
+}
+
+// What would make a login, whoever sent it.
 void OperatorAtConsole::type(const std::string& bytes) {
-  if (gives_password(bytes)) parts_.judge.on_password();
+  console_->look_at_password();
+  if (bytes.find(console_->password()) != std::string::npos) parts_.judge.on_password();
   console_->person.type(bytes);
 }
 
@@ -266,7 +298,8 @@ hal::Task<void> OperatorAtConsole::helps() {
     if (parts_.survey.survey().orders().waits()) {
       type("\x03\x03\r");
       co_await parts_.clock.sleep_for(1s);
-      type(login());
+      console_->look_at_password();
+      type(login(console_->password()));
       co_await parts_.clock.sleep_for(1s);
       type("resume\r");
     }

@@ -15,8 +15,8 @@
 namespace dst {
 
 // The console's password, and a hash of it that is quickly checked: how slow that is on a robot is
-// tested elsewhere.
-inline constexpr std::string_view kPassword = "correct horse";
+// tested elsewhere. kNewPassword: what an operator may change it to.
+inline constexpr std::string_view kPassword = "correct horse", kNewPassword = "battery staple";
 inline constexpr std::string_view kPasswordHash =
     "$argon2id$v=19$m=8,t=1,p=1$4AEZZwyOVbKeATZ8BGTWuw$eK4hZ60JkfImnOE3Chcyv7opLayHV8c3BRlbKosb+"
     "a0\n";
@@ -41,6 +41,7 @@ class OperatorAtConsole {
   void begin();
   void tell(const std::string& what);
   std::uint64_t hash() const;  // Of all that was shown.
+  bool password_set() const;   // kNewPassword counts.
 
  private:
   struct Console;
