@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "hal/angles.hpp"
 #include "nav/registration/rigid.hpp"
@@ -12,6 +13,7 @@ namespace nav {
 namespace {
 
 constexpr double kGyroGapMax_s = 0.25;  // Samples farther apart: the gyro was silent.
+constexpr double kGyroDense_s = 0.05;   // Farther apart: the rate in between is not known.
 constexpr double kStill_m = 1e-6;       // Travel of a side that stands.
 constexpr double kTurnOutlier = 5;      // Sigmas: a robot that turns although its wheels stand.
 constexpr double kTurnFloor_radps = 0.002;
@@ -70,12 +72,18 @@ Gate LocalizerFilter::take(const LocalizerConfig& config, const InertialSample& 
   const auto before = imu_time_;
   if (!sample.rate_radps.allFinite() || (before && sample.stamp <= *before)) return Gate::rejected;
   imu_time_ = sample.stamp;
+  const WheelTurn told = std::exchange(told_, {});
+  const double change_radps =
+      (sample.rate_radps - std::exchange(rate_radps_, sample.rate_radps)).norm();
   if (!before) return Gate::accepted;
   const double step_s = hal::seconds(sample.stamp - *before);
   if (step_s > kGyroGapMax_s) return Gate::accepted;
   turn_.angle_rad += sample.rate_radps * step_s;
+  turn_.told.angle_rad += told.angle_rad;
+  turn_.told.by_slip += told.by_slip;
   turn_.span_s += step_s;
   turn_.variance += std::pow(config.gyro_sigma_radps * step_s, 2);
+  if (step_s > kGyroDense_s) turn_.variance += std::pow(change_radps * step_s / 2, 2);
   knows_tilt_ = sample.specific_force_mps2.has_value();
   if (knows_tilt_ && sample.specific_force_mps2->allFinite()) {
     turn_.force_sum += *sample.specific_force_mps2;
@@ -108,7 +116,9 @@ Gate LocalizerFilter::take(const LocalizerConfig& config, const hal::WheelTravel
   // The share of the time that the gyro did not cover is left to the wheels; less than half is a
   // sample that fell next door.
   const double silent = span_s > 0 ? std::clamp(1 - turn.span_s / span_s, 0.0, 1.0) : 1.0;
-  move(config, travel, turn, silent > 0.5 ? silent : 0);
+  const double since_sample_s = imu_time_ ? hal::seconds(travel.stamp - *imu_time_) : 0;
+  const double untold = span_s > 0 ? std::clamp(since_sample_s / span_s, 0.0, 1.0) : 0;
+  move(config, travel, turn, silent > 0.5 ? silent : 0, untold);
   level(config, turn, span_s, span_s > 0 ? (speed_mps_ - speed_before_mps) / span_s : 0);
   return Gate::accepted;
 }
@@ -142,9 +152,10 @@ void LocalizerFilter::learn_bias(const Turn& turn) {
   }
 }
 
-// by_wheels: the share of the turn that the wheels must tell.
+// by_wheels: the share of the turn that the wheels must tell; untold: the share of the time that
+// the gyro may tell later. What wheels told of a time that it tells now is taken back.
 void LocalizerFilter::move(const LocalizerConfig& config, const hal::WheelTravel& travel,
-                           const Turn& turn, double by_wheels) {
+                           const Turn& turn, double by_wheels, double untold) {
   // Slip is what a wheel turned without moving the robot.
   const double left_m = travel.left_m * (1 - slip_[0]);
   const double right_m = travel.right_m * (1 - slip_[1]);
@@ -152,9 +163,14 @@ void LocalizerFilter::move(const LocalizerConfig& config, const hal::WheelTravel
   const double wheel_turn_rad = by_wheels * (right_m - left_m) / config.track_m;
   Eigen::Vector3d turned = turn.angle_rad - bias_radps_ * turn.span_s;
   if (!knows_tilt_) turned.head<2>().setZero();
-  turned.z() += wheel_turn_rad;
   const double wheels_s = travel.left_m == travel.right_m ? 0.0 : 1.0;
-  turn_radps_ = turn.span_s > 0 ? turned.z() / turn.span_s : wheels_s * turn_radps_;
+  turn_radps_ =
+      turn.span_s > 0 ? (turned.z() + wheel_turn_rad) / turn.span_s : wheels_s * turn_radps_;
+  turned.z() += wheel_turn_rad - turn.told.angle_rad;
+  const Eigen::Vector2d by_slip =
+      by_wheels / config.track_m * Eigen::Vector2d(travel.left_m, -travel.right_m);
+  told_.angle_rad += untold * wheel_turn_rad;
+  told_.by_slip += untold * by_slip;
 
   const Eigen::Matrix3d R_mid = R_W_B_ * rotation_of(turned / 2);
   const Eigen::Vector3d W_step_m = forward_m * R_mid.col(0);
@@ -163,8 +179,8 @@ void LocalizerFilter::move(const LocalizerConfig& config, const hal::WheelTravel
   Rows<3> turn_by = Rows<3>::Zero();
   turn_by(2, kBias + 2) = -turn.span_s;
   if (knows_tilt_) turn_by(0, kBias) = turn_by(1, kBias + 1) = -turn.span_s;
-  turn_by(2, kSlipLeft) = by_wheels * travel.left_m / config.track_m;
-  turn_by(2, kSlipRight) = -by_wheels * travel.right_m / config.track_m;
+  turn_by(2, kSlipLeft) = by_slip[0] - turn.told.by_slip[0];
+  turn_by(2, kSlipRight) = by_slip[1] - turn.told.by_slip[1];
   const Rows<3> W_turn_by = R_mid.lazyProduct(turn_by);
   Rows<3> step_by = (swings / 2).lazyProduct(W_turn_by);
   step_by.middleCols<3>(kTheta) += swings;

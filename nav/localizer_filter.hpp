@@ -120,9 +120,16 @@ class LocalizerFilter {
 
   static constexpr double kStandingAfter_s = 0.5;
 
+  // Told by wheels, and how it depends on their slip.
+  struct WheelTurn {
+    double angle_rad{};
+    Eigen::Vector2d by_slip{0, 0};
+  };
+
   // Inertial samples since the last travel report.
   struct Turn {
     Eigen::Vector3d angle_rad{0, 0, 0};
+    WheelTurn told;  // Of it, by the wheels before these samples came.
     Eigen::Vector3d force_sum{0, 0, 0};
     int forces{};
     double span_s{};
@@ -154,7 +161,7 @@ class LocalizerFilter {
   bool stands(const hal::WheelTravel& travel, const Turn& turn, double span_s);
   void learn_bias(const Turn& turn);
   void move(const LocalizerConfig& config, const hal::WheelTravel& travel, const Turn& turn,
-            double by_wheels);
+            double by_wheels, double untold);
   void add_travel_noise(const LocalizerConfig& config, const hal::WheelTravel& travel,
                         double forward_m, const Eigen::Matrix3d& R_mid);
   void forget_slip(const LocalizerConfig& config, int side, double travel_m);
@@ -183,7 +190,9 @@ class LocalizerFilter {
   Eigen::Vector2d wander_{0, 0};
   Matrix covariance_ = Matrix::Zero();
   Turn turn_;
-  bool knows_tilt_{};  // All axes of the gyro are there.
+  WheelTurn told_;  // Since the last inertial sample: the next one tells it again.
+  Eigen::Vector3d rate_radps_{0, 0, 0};  // Of that sample.
+  bool knows_tilt_{};                    // All axes of the gyro are there.
   std::optional<hal::Time> imu_time_, travel_time_, fix_time_;
   std::optional<Agreeing> agreeing_;
   Move move_;

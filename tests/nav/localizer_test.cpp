@@ -10,6 +10,7 @@
 #include <functional>
 #include <numbers>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "hal/angles.hpp"
@@ -230,6 +231,35 @@ TEST(Localizer, ASilentGyroLeavesHeadingToWheelsAndFixes) {
   EXPECT_LT(figures.heading_rms_rad, 2 * kDeg);
   EXPECT_GT(figures.nees_mean, 1);
   EXPECT_LT(figures.nees_mean, 5);
+}
+
+// A turn on the spot, whose wheels are told 50 times a second. Where no sample of the gyro falls
+// between two of their reports, the wheels tell the turn, and the next sample tells it again.
+TEST(Localizer, TurnsOnceHoweverSeldomItsGyroSpeaks) {
+  for (const int every_ms : {20, 25, 30, 45, 60, 75, 100, 150, 200, 250}) {
+    SCOPED_TRACE(every_ms);
+    const nav::LocalizerConfig config;
+    nav::Localizer localizer(config, {}, 1e-8 * Eigen::Matrix3d::Identity());
+    double heading_rad = 0, told_rad = 0;
+    for (int now_ms = 0; now_ms <= 6000; ++now_ms) {
+      const hal::Time now{std::chrono::milliseconds(now_ms)};
+      const double rate_radps =
+          45 * kDeg * std::clamp(std::min(now_ms - 1000, 5000 - now_ms) / 200.0, 0.0, 1.0);
+      heading_rad += 0.001 * rate_radps;
+      if (now_ms % every_ms == 0) localizer.predict(hal::ImuSample{now, rate_radps});
+      if (now_ms % 20 != 0) continue;
+      const double side_m =
+          (heading_rad - std::exchange(told_rad, heading_rad)) * config.track_m / 2;
+      localizer.predict(hal::WheelTravel{now, -side_m, side_m});
+    }
+    const double sigma_rad = std::sqrt(localizer.covariance()(2, 2));
+    const double off_rad =
+        std::remainder(localizer.pose().heading_rad - heading_rad, 2 * std::numbers::pi);
+    EXPECT_LT(std::abs(off_rad), 3 * sigma_rad + 1.0 * kDeg);
+    EXPECT_LT(std::abs(off_rad), 8 * kDeg);
+    EXPECT_LT(sigma_rad, 8 * kDeg);
+    EXPECT_LT(localizer.pose().position_m.norm(), 0.02);
+  }
 }
 
 TEST(Localizer, StandingStillAddsNoUncertaintyAndNoTurn) {
