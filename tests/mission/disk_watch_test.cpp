@@ -5,6 +5,7 @@
 
 #include "tests/drivers/allocations.hpp"
 
+namespace disk_watch_tests {
 namespace {
 
 using namespace std::chrono_literals;
@@ -99,3 +100,4 @@ TEST(DiskWatch, AllocatesNothingWhenAsked) {
 }
 
 }  // namespace
+}  // namespace disk_watch_tests
