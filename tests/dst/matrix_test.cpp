@@ -26,6 +26,16 @@ INSTANTIATE_TEST_SUITE_P(Devices, Matrix, testing::ValuesIn(matrix()), [](const 
   return std::string(param.param.role) + "_" + std::string(param.param.fault);
 });
 
+// Slower than the wheels, it does not make the robot lose its way: it comes home.
+TEST(SlowImu, LeavesTheRobotWhereItBelievesToBe) {
+  const auto slow = std::ranges::find_if(
+      matrix(), [](const Cell& cell) { return cell.role == "imu" && cell.fault == "slow"; });
+  ASSERT_NE(slow, matrix().end());
+  const Outcome outcome = run_cell(*slow);
+  EXPECT_TRUE(outcome.completed) << outcome.end;
+  EXPECT_LT(outcome.from_start_m, 0.1);
+}
+
 TEST(MatrixTable, HasEveryFaultOfEveryDevice) {
   std::set<std::pair<std::string_view, std::string_view>> cells;
   for (const Cell& cell : matrix()) cells.emplace(cell.role, cell.fault);

@@ -43,7 +43,7 @@ const std::vector<Cell>& matrix() {
       {"imu", "stuck", "imu: frozen", true},
       {"imu", "garbage", "imu: damaged bytes", true},
       {"imu", "wrong", "imu: values impossible", false},
-      {"imu", "slow", "imu: slower than set", false},  // Walls seen ahead keep the pose certain.
+      {"imu", "slow", "imu: slower than set", false},
       {"imu", "delayed", "imu: messages late", false},
       {"imu", "intermittent", "imu: silent", true},
       {"imu", "duplicated_reordered", "imu: messages repeated or out of order", false},

@@ -372,6 +372,7 @@ Outcome Mission::outcome() {
   outcome_.scans = record.scans.size();
   outcome_.virtual_time = clock_.now().time_since_epoch();
   outcome_.driven_m = rig_.world().driven_m();
+  outcome_.from_start_m = (stands().position_m - begin_.stands.position_m).norm();
   outcome_.decisions_hash = hash_of(begin_.folder / "decisions.jsonl");
   outcome_.decisions = last_lines(begin_.folder / "decisions.jsonl");
   outcome_.frames_hash = judge_.frames_hash();

@@ -23,6 +23,7 @@ struct Outcome {
   hal::Duration virtual_time{};
   double cpu_s{};  // Of one core.
   double driven_m{};
+  double from_start_m{};  // Where the robot really stands at the end, from where it began.
   std::uint64_t decisions_hash{}, frames_hash{}, journal_hash{}, console_hash{};  // The trace.
   int resumed{};  // How often a person went on with the run: after a power cut, a failed disk.
   int stops{};
