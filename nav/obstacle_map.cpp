@@ -98,25 +98,30 @@ double nearest_beside_m(std::span<const Vector2d> obstacles, const Way& way, dou
 
 void ObstacleMap::add(const hal::Profile& profile, const hal::Pose2& W_scanner, hal::Time now) {
   take_out_empty(profile, W_scanner, now);
-  auto latest = cells_.end();  // Beams beside each other often end in one cell.
+  auto latest = cells_.end();
   for (std::size_t i = 0; i < profile.ranges_m.size(); ++i) {
     const double range_m = profile.ranges_m[i];
     if (!(range_m >= config_.range_min_m && range_m <= config_.reach_m)) continue;
     const double angle_rad = W_scanner.heading_rad + profile.angle_first_rad +
                              static_cast<double>(i) * profile.angle_step_rad;
-    const Vector2d point_m = W_scanner.position_m + range_m * towards(angle_rad);
-    const std::pair<int, int> place(static_cast<int>(std::floor(point_m.x() / config_.cell_m)),
-                                    static_cast<int>(std::floor(point_m.y() / config_.cell_m)));
-    if (latest == cells_.end() || latest->first != place) latest = cells_.try_emplace(place).first;
-    Cell& cell = latest->second;
-    // Of one profile's returns in a cell the nearest: it is the one to be touched first.
-    const bool nearer =
-        (point_m - W_scanner.position_m).norm() < (cell.W_point_m - W_scanner.position_m).norm();
-    if (cell.hits == 0 || cell.seen != now || nearer) cell.W_point_m = point_m;
-    cell.hits = std::min(cell.hits + 1, config_.hits_min);
-    cell.misses = 0;
-    cell.seen = now;
+    hit(W_scanner.position_m + range_m * towards(angle_rad), W_scanner.position_m, now, latest);
   }
+}
+
+// Beams beside each other often end in one cell. Of one profile's returns there the nearest counts:
+// it is the one to be touched first.
+ObstacleMap::Cell& ObstacleMap::hit(const Vector2d& W_point_m, const Vector2d& W_from_m,
+                                    hal::Time now, Cells::iterator& latest) {
+  const std::pair<int, int> place(static_cast<int>(std::floor(W_point_m.x() / config_.cell_m)),
+                                  static_cast<int>(std::floor(W_point_m.y() / config_.cell_m)));
+  if (latest == cells_.end() || latest->first != place) latest = cells_.try_emplace(place).first;
+  Cell& cell = latest->second;
+  const bool nearer = (W_point_m - W_from_m).norm() < (cell.W_point_m - W_from_m).norm();
+  if (cell.hits == 0 || cell.seen != now || nearer) cell.W_point_m = W_point_m;
+  cell.hits = std::min(cell.hits + 1, config_.hits_min);
+  cell.misses = 0;
+  cell.seen = now;
+  return cell;
 }
 
 // The beam at its middle and those beside it: the edge of something that stands before a cell must

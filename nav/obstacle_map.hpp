@@ -1,5 +1,6 @@
-// What a profile scanner that looks level shows around the robot while it drives, and how fast that
-// lets it go. Pure: profiles, poses and times in, points and speeds out.
+// What a scanner that looks level, or with rows of beams above each other, shows around the robot
+// while it drives, and how fast that lets it go. Pure: profiles, poses and times in, points and
+// speeds out.
 #pragma once
 
 #include <limits>
@@ -9,10 +10,18 @@
 #include <utility>
 #include <vector>
 
+#include "hal/turns.hpp"
 #include "hal/values.hpp"
 #include "nav/follow.hpp"
 
 namespace nav {
+
+// A turn with rows of beams, and how the body went while it was measured.
+struct MovingTurn {
+  hal::Turn turn;
+  double height_m{};           // Of S, which stands over the body's middle, above the ground.
+  hal::Pose2 W_first, W_last;  // The body as believed at the first and at the last column.
+};
 
 struct ObstacleMapConfig {
   double cell_m = 0.1;
@@ -22,6 +31,14 @@ struct ObstacleMapConfig {
   double see_through_m = 0.15;  // A beam that goes on so far beyond a cell has found it empty.
   int misses_max = 5;           // Beams at a cell that came back from nowhere, until it is empty.
   double forget_s = 10;         // What nothing looked at any more for so long.
+  // Of turns with rows. Heights are above the ground under the robot, in its own plane.
+  double blind_m = 0;            // Nearer than this the scanner measures nothing: no news there.
+  double ground_m = 0.15;        // What ends lower is ground, which may rise
+  double ground_rise = 0.05;     // so much a metre;
+  double top_m = 1.5;            // what ends higher the robot drives under.
+  double inside_m = 0.02;        // A beam tells that a thing has gone where it passes through it
+                                 // so far below its top as seen, and not under it.
+  double forget_hidden_s = 120;  // What stands too low or too near for any beam to look at it.
 };
 
 // At most one point per cell, so at most (2 reach / cell)^2.
@@ -32,7 +49,12 @@ class ObstacleMap {
   // One turn, measured level at W_scanner (its x axis along the heading). Returns within reach
   // become points; points through which beams went are taken out, and so are old ones.
   void add(const hal::Profile& profile, const hal::Pose2& W_scanner, hal::Time now);
+  // One turn with rows, each beam from where the robot was. A beam takes out only what was seen at
+  // the height at which it passes: what it passes over may stand there still.
+  void add(const MovingTurn& seen, hal::Time now);
   void clear() { cells_.clear(); }
+  // But for what the latest turn with rows could not look at: it is not going to be seen anew.
+  void clear_but_hidden();
 
   // The latest return of each cell that counts, in W; the order depends on nothing but their
   // places.
@@ -43,14 +65,24 @@ class ObstacleMap {
     Eigen::Vector2d W_point_m;
     int hits{}, misses{};
     hal::Time seen{};
+    double low_m{}, high_m{};  // Of its returns, above the ground; of turns with rows.
+    bool hidden{};             // From all rows of the latest turn.
   };
+  using Cells = std::map<std::pair<int, int>, Cell>;
   // What the beams at a cell say of it.
   enum class Look { nothing, passed, came_back_from_nowhere };
   Look look_at(const Cell& cell, const hal::Profile& profile, const hal::Pose2& W_scanner) const;
   void take_out_empty(const hal::Profile& profile, const hal::Pose2& W_scanner, hal::Time now);
+  struct Rows;
+  Look look_at(Cell& cell, const Rows& rows) const;
+  void take_out_empty(const Rows& rows, hal::Time now);
+  void put(const Rows& rows, std::size_t row, hal::Time now);
+  // `latest`: the cell of the return before, or the end.
+  Cell& hit(const Eigen::Vector2d& W_point_m, const Eigen::Vector2d& W_from_m, hal::Time now,
+            Cells::iterator& latest);
 
   const ObstacleMapConfig config_;
-  std::map<std::pair<int, int>, Cell> cells_;
+  Cells cells_;
 };
 
 struct ZoneConfig {

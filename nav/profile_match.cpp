@@ -8,23 +8,9 @@
 
 #include "hal/angles.hpp"
 #include "nav/linear.hpp"
+#include "nav/moving.hpp"
 
 namespace nav {
-namespace {
-
-// Of the way from one pose to the other, `share` of it.
-Eigen::Isometry2d on_the_way(const hal::Pose2& from, const hal::Pose2& to, double share) {
-  const double turn_rad = hal::wrapped(to.heading_rad - from.heading_rad);
-  return Eigen::Translation2d(from.position_m + share * (to.position_m - from.position_m)) *
-         Eigen::Rotation2Dd(from.heading_rad + share * turn_rad);
-}
-
-Eigen::Isometry2d placed(const hal::Pose2& pose) {
-  return Eigen::Translation2d(pose.position_m) * Eigen::Rotation2Dd(pose.heading_rad);
-}
-
-}  // namespace
-
 ScanMatchConfig ProfileMatchConfig::driving() {
   ScanMatchConfig config;
   config.searches = false;
@@ -53,9 +39,7 @@ std::vector<Eigen::Vector2d> level_points(const MovingProfile& seen,
     const Eigen::Vector3d level = seen.R_level * Eigen::Vector3d(B_point.x(), B_point.y(), 0);
     const double above_m = seen.height_m + level.z();
     if (above_m < config.low_m || above_m > config.high_m) continue;
-    const double share =
-        static_cast<double>(i) / static_cast<double>(std::max<std::size_t>(1, beams - 1));
-    points.emplace_back(T_last_W * on_the_way(seen.W_first, seen.W_last, share) *
+    points.emplace_back(T_last_W * on_the_way(seen.W_first, seen.W_last, share_of_turn(i, beams)) *
                         Eigen::Vector2d(level.head<2>()));
   }
   return points;
