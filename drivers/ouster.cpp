@@ -58,13 +58,16 @@ void Ouster::adopt(OusterMetadata metadata) {
   const OusterMetadata& m = config_.metadata;
   pattern_ = pattern_of(m);
   cells_.clear();
+  row_cones_.clear();
+  for (std::size_t row = 0; row < m.rows; ++row) row_cones_.push_back(cone_of(beam_of(m, row, 0)));
   identity_ = {"Ouster", m.model, m.serial_number, m.firmware};
   cells_.reserve(m.rows * m.columns_per_frame);
   for (std::size_t row = 0; row < m.rows; ++row)
     for (std::size_t id = 0; id < m.columns_per_frame; ++id) {
-      Cell cell{beam_of(m, row, static_cast<std::uint16_t>(id)), 0, 0};
+      Cell cell{beam_of(m, row, static_cast<std::uint16_t>(id)), 0, 0, 0};
       const Eigen::Vector3f& d = cell.beam.S_direction;
-      const double at = std::atan2(double{d.y()}, double{d.x()}) + std::numbers::pi;
+      cell.azimuth_rad = std::atan2(double{d.y()}, double{d.x()});
+      const double at = cell.azimuth_rad + std::numbers::pi;
       const double columns = at / pattern_.azimuth_step_rad;
       cell.column = std::min(static_cast<std::uint32_t>(columns), pattern_.columns - 1);
       cell.off_rad =
@@ -90,6 +93,7 @@ std::string_view Ouster::read(ByteView bytes, hal::Time arrival) {
   const double step_s = last_ns_ ? static_cast<double>(now_ns - *last_ns_) / 1e9 : period_s_;
   if (step_s > 0) fit_.add(now_ns, arrival);
   if (is_new(step_s, period_s_, step_s > 0 ? fit_.last_excess_s() : 0)) last_ns_ = now_ns;
+  arrived_ = arrival;
   tell_faults();
   return {};
 }
@@ -134,6 +138,41 @@ void Ouster::fill(TurnMerge& into) {
       const float range_m = static_cast<float>(range_mm[row * m.columns_per_packet + c]) / 1000;
       into.add(cell.column, static_cast<std::uint32_t>(m.rows - 1 - row), range_m, cell.beam,
                cell.off_rad);
+    }
+  }
+}
+
+std::vector<BeamCone> Ouster::cones() const {
+  std::vector<BeamCone> rows;
+  for (const ConeOfBeam& of_row : row_cones_) rows.insert(rows.begin(), of_row.cone);
+  return rows;
+}
+
+// As its middle row measures it: the others are a few columns ahead and behind.
+UdpScanner::PacketStart Ouster::starts() const {
+  const OusterMetadata& m = config_.metadata;
+  const double step_rad = kTurn / static_cast<double>(m.columns_per_frame);
+  const Eigen::Vector3f& first = cells_[0].beam.S_direction;
+  const double zero_rad =
+      std::atan2(double{first.y()}, double{first.x()}) + m.beam_azimuth_deg[0] * kDeg;
+  return {zero_rad - packet_.columns.front().measurement_id * step_rad,
+          fit_.to_ours(last_ns_.value_or(0)).value_or(arrived_)};
+}
+
+void Ouster::look(TurnAssembly& into) const {
+  const OusterMetadata& m = config_.metadata;
+  const auto& range_mm = packet_.returns[0].range_mm;
+  for (std::size_t row = 0; row < m.rows; ++row) {
+    const std::size_t from_lowest = m.rows - 1 - row;
+    if (!into.looks(from_lowest)) continue;
+    const auto farther_m = static_cast<float>(row_cones_[row].farther_m);
+    for (std::size_t c = 0; c < m.columns_per_packet; ++c) {
+      const OusterColumn& column = packet_.columns[c];
+      if (!column.valid) continue;
+      const std::uint32_t mm = range_mm[row * m.columns_per_packet + c];
+      const Cell& cell = cells_[row * m.columns_per_frame + column.measurement_id];
+      into.add(from_lowest, cell.azimuth_rad,
+               mm == 0 ? 0 : static_cast<float>(mm) / 1000 + farther_m);
     }
   }
 }

@@ -42,6 +42,10 @@ class Ouster final : public UdpScanner {
   void begin() override;
   void fill(TurnMerge& into) override;
   int turns_done() const override { return turns_; }
+  std::vector<BeamCone> cones() const override;
+  std::uint32_t look_columns() const override { return pattern_.columns; }
+  PacketStart starts() const override;
+  void look(TurnAssembly& into) const override;
   void adopt(OusterMetadata metadata);
 
   OusterConfig config_;
@@ -52,13 +56,16 @@ class Ouster final : public UdpScanner {
     hal::Beam beam;
     std::uint32_t column{};
     float off_rad{};
+    double azimuth_rad{};
   };
   std::vector<Cell> cells_;
+  std::vector<ConeOfBeam> row_cones_;  // As rows come in packets: from the highest.
   OusterPacket packet_;
   ClockFit fit_;
   std::vector<const Fault*> faults_;
   std::optional<std::int64_t> last_ns_;
   double period_s_{};  // From packet to packet, as the first one said.
+  hal::Time arrived_{};
   std::optional<std::uint16_t> frame_;
   int turns_{};
 };

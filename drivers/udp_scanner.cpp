@@ -4,6 +4,7 @@
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace drivers {
 namespace {
@@ -25,6 +26,7 @@ constexpr Fault kReceive{3, "cannot receive", "the network port", "see the detai
 constexpr hal::Duration kSilence = 1s;
 constexpr hal::Duration kComeBack = 10s;
 constexpr int kForeignInARow = 10;
+constexpr hal::Duration kLookTimeout = 1s;
 constexpr float kNoClaim = std::numeric_limits<float>::quiet_NaN();
 
 }  // namespace
@@ -111,9 +113,70 @@ void UdpScanner::take(ByteView packet, hal::Time arrival) {
     state_ = DeviceState::running;
     changed_.notify();
   }
+  if (turns_) take_look();
   if (!merge_) return;
   fill(*merge_);
   if (turns_done() >= config_.turns) done_.notify();
+}
+
+// A turn with gaps might lack just what is in the way.
+void UdpScanner::take_look() {
+  const PacketStart start = starts();
+  if (auto turn = turns_->next_packet(start.azimuth_rad, start.at)) {
+    const auto lost = static_cast<double>(lost_ - turn_lost_);
+    const auto came = static_cast<double>(packets_ - turn_packets_);
+    turn_lost_ = lost_;
+    turn_packets_ = packets_;
+    if (lost <= config_.look_lost_share_max * (lost + came))
+      put(std::move(*turn));
+    else
+      ++looks_lost_;
+  }
+  look(*turns_);
+}
+
+void UdpScanner::put(hal::Turn turn) {
+  turn.lost_before = std::exchange(looks_lost_, 0);
+  looks_.push_back(std::move(turn));
+  if (looks_.size() > kLooksMax) {
+    const std::uint64_t lost = 1 + looks_.front().lost_before;
+    looks_.pop_front();
+    looks_.front().lost_before += lost;
+  }
+  looked_.notify();
+}
+
+hal::Task<hal::Result<void>> UdpScanner::start() {
+  turns_.emplace(look_columns(), cones(), config_.look_max_rad);
+  looks_.clear();
+  turn_lost_ = lost_;
+  turn_packets_ = packets_;
+  looks_lost_ = 0;
+  if (state_ != DeviceState::running) co_return make_error_code(errc::not_connected);
+  co_return hal::Result<void>{};
+}
+
+hal::Task<hal::Result<void>> UdpScanner::stop() {
+  turns_.reset();
+  co_return hal::Result<void>{};
+}
+
+hal::Task<hal::Result<hal::Turn>> UdpScanner::next_turn() {
+  const hal::Time deadline = clock_.now() + kLookTimeout;
+  if (!turns_) co_return make_error_code(errc::operation_not_permitted);
+  while (looks_.empty()) {
+    const bool some = co_await looked_.wait_until(clock_, deadline);
+    if (!some) co_return make_error_code(errc::timed_out);
+  }
+  hal::Turn turn = std::move(looks_.front());
+  looks_.pop_front();
+  co_return turn;
+}
+
+hal::Task<hal::Result<hal::Profile>> UdpScanner::next_profile() {
+  const auto turn = co_await next_turn();
+  if (!turn) co_return turn.error();
+  co_return hal::level_profile(*turn);
 }
 
 bool UdpScanner::is_new(double step_s, double period_s, double late_s) {

@@ -1,7 +1,9 @@
 // What scanners that send their turns as UDP packets have in common: packets are judged as they
-// come, and a scan is a few whole turns while the robot stands, merged.
+// come, a scan is a few whole turns while the robot stands, merged, and while it drives each turn
+// is a profile with rows.
 #pragma once
 
+#include <deque>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -12,9 +14,11 @@
 #include "drivers/profile_stream.hpp"
 #include "drivers/signal.hpp"
 #include "drivers/troubles.hpp"
+#include "drivers/turn_assembly.hpp"
 #include "hal/clock.hpp"
 #include "hal/devices.hpp"
 #include "hal/links.hpp"
+#include "hal/turn_scanner.hpp"
 
 namespace drivers {
 
@@ -38,14 +42,27 @@ class TurnMerge {
 struct UdpScanConfig {
   int turns = 10;                // That a scan merges.
   double lost_share_max = 0.02;  // Of a scan's packets.
+  // On the way: rows up to this elevation are looked at; and a turn that lost more than this share
+  // of its packets is none.
+  double look_max_rad = 0;
+  double look_lost_share_max = 0.1;
 };
 
-class UdpScanner : public hal::Scanner, public Device {
+class UdpScanner : public hal::Scanner, public hal::TurnScanner, public Device {
  public:
   // Fails with errc::not_connected when no packets come for 10 s, errc::timed_out when the turns do
   // not get complete, errc::io_error when too many packets are lost: problem() says so.
   hal::Task<hal::Result<hal::ScanCloud>> scan() override;
   const std::string& problem() const { return problem_; }  // Of the last scan; empty: none.
+
+  // It sends always: between start and stop its turns are told too. start() fails with
+  // errc::not_connected when no packets come; they are told once they do.
+  hal::Task<hal::Result<void>> start() override;
+  hal::Task<hal::Result<void>> stop() override;
+  // Fails with errc::operation_not_permitted when not started, errc::timed_out after 1 s without a
+  // whole turn.
+  hal::Task<hal::Result<hal::Turn>> next_turn() override;
+  hal::Task<hal::Result<hal::Profile>> next_profile() override;
 
   hal::Task<void> run() override;
   DeviceState state() const override { return state_; }
@@ -67,6 +84,16 @@ class UdpScanner : public hal::Scanner, public Device {
   virtual void begin() = 0;
   virtual void fill(TurnMerge& into) = 0;  // From the packet that read() read last.
   virtual int turns_done() const = 0;
+  // The rows of its beams, from the lowest, and in how many columns its turns are told.
+  virtual std::vector<BeamCone> cones() const = 0;
+  virtual std::uint32_t look_columns() const = 0;
+  // Where the packet that read() read last begins, and when by our clock; and its beams.
+  struct PacketStart {
+    double azimuth_rad{};
+    hal::Time at{};
+  };
+  virtual PacketStart starts() const = 0;
+  virtual void look(TurnAssembly& into) const = 0;
 
   // For read(): whether a packet so much after the one before is new, with the expected step.
   bool is_new(double step_s, double period_s, double late_s);
@@ -76,9 +103,13 @@ class UdpScanner : public hal::Scanner, public Device {
   ScanWatch watch_{troubles_};
 
  private:
+  static constexpr std::size_t kLooksMax = 4;  // That wait: the newest are what counts.
+
   hal::Task<void> receive();
   hal::Task<void> watch();
   void take(ByteView packet, hal::Time arrival);
+  void take_look();
+  void put(hal::Turn turn);
 
   const UdpScanConfig config_;
   hal::Clock& clock_;
@@ -87,6 +118,11 @@ class UdpScanner : public hal::Scanner, public Device {
   std::string problem_;
   Signal changed_, done_;
   std::optional<TurnMerge> merge_;
+  std::optional<TurnAssembly> turns_;  // While turns are told.
+  std::deque<hal::Turn> looks_;
+  Signal looked_;
+  std::uint64_t turn_packets_{}, turn_lost_{};  // packets_ and lost_ when the turn began.
+  std::uint64_t looks_lost_{};                  // Turns since the last that was told.
   bool fresh_{};
   hal::Time last_packet_{};
   int others_in_a_row_{};

@@ -48,6 +48,7 @@ std::string_view Velodyne::read(ByteView bytes, hal::Time arrival) {
   const double step_s = last_us_ ? static_cast<double>(now_us - *last_us_) / 1e6 : period_s;
   if (step_s > 0) fit_.add(now_us * 1000, arrival);
   if (is_new(step_s, period_s, step_s > 0 ? fit_.last_excess_s() : 0)) last_us_ = now_us;
+  arrived_ = arrival;
   return {};
 }
 
@@ -74,6 +75,27 @@ void Velodyne::fill(TurnMerge& into) {
             .cast<float>()};
     into.add(column, row_of(point.laser), static_cast<float>(point.distance_2mm) * 0.002F, beam,
              static_cast<float>(std::abs(at - (column + 0.5) * step)));
+  }
+}
+
+std::vector<BeamCone> Velodyne::cones() const {
+  std::vector<BeamCone> rows(kRows);
+  for (std::size_t laser = 0; laser < kRows; ++laser)
+    rows[row_of(laser)] = {velodyne_elevation_deg(laser) * kDeg, velodyne_offset_m(laser)};
+  return rows;
+}
+
+UdpScanner::PacketStart Velodyne::starts() const {
+  return {-packet_.points.front().azimuth_deg * kDeg,
+          fit_.to_ours(last_us_.value_or(0) * 1000).value_or(arrived_)};
+}
+
+void Velodyne::look(TurnAssembly& into) const {
+  for (const VelodynePoint& point : packet_.points) {
+    if (point.second_return != 0) continue;
+    const std::uint32_t row = row_of(point.laser);
+    if (into.looks(row))
+      into.add(row, -point.azimuth_deg * kDeg, static_cast<float>(point.distance_2mm) * 0.002F);
   }
 }
 

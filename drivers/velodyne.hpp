@@ -27,6 +27,10 @@ class Velodyne final : public UdpScanner {
   void begin() override;
   void fill(TurnMerge& into) override;
   int turns_done() const override { return static_cast<int>(swept_deg_ / 360); }
+  std::vector<BeamCone> cones() const override;
+  std::uint32_t look_columns() const override { return config_.columns; }
+  PacketStart starts() const override;
+  void look(TurnAssembly& into) const override;
 
   const VelodyneConfig config_;
   VelodynePacket packet_;
@@ -34,6 +38,7 @@ class Velodyne final : public UdpScanner {
   std::int64_t hours_us_{};  // Of the full hours that the time stamps leave out.
   std::optional<std::int64_t> last_us_;
   std::optional<double> last_azimuth_deg_;
+  hal::Time arrived_{};
   double swept_deg_{};
 };
 

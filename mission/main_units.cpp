@@ -126,7 +126,7 @@ void RobotUnits::add_turning(const ScannerConfig& config, const UnitLinks& links
         links.packets_port != 0 ? links.packets_port : packets_port(config);
     ouster.ranges = world_.config().scanner;
     ouster.seed = seed_;
-    ouster.blind_in_motion = true;
+    ouster.in_motion_max_rad = -hal::radians(90);
     ouster_.emplace(std::move(ouster), world_, clock_, packets, add_faults("scanner"),
                     asks_ouster(config) ? links.scanner_api : nullptr);
     return;
@@ -134,7 +134,7 @@ void RobotUnits::add_turning(const ScannerConfig& config, const UnitLinks& links
   sim::VelodyneUnitConfig velodyne;
   velodyne.ranges = world_.config().scanner;
   velodyne.seed = seed_;
-  velodyne.blind_in_motion = true;
+  velodyne.in_motion_max_rad = -hal::radians(90);
   velodyne_.emplace(velodyne, world_, clock_, packets, add_faults("scanner"));
 }
 

@@ -37,8 +37,6 @@ OusterUnit::OusterUnit(OusterUnitConfig config, World& world, hal::Clock& clock,
   }
   packet_.near_ir.resize(pixels);
   packet_.window.resize(pixels);
-  rays_.resize(pixels);
-  ranges_m_.resize(pixels);
   for (std::size_t row = 0; row < m.rows; ++row)
     for (std::size_t id = 0; id < m.columns_per_frame; ++id) {
       const auto at = [&](std::uint32_t mm) {
@@ -111,6 +109,9 @@ void OusterUnit::measure(hal::Time at) {
       (placed ? *placed : world_.robot()).T_W_S(world_.config().scanner.height_m);
   const drivers::OusterMetadata& m = config_.metadata;
   const std::uint64_t first = number_ * m.columns_per_packet;
+  const double highest = world_.moving() ? config_.in_motion_max_rad : std::numbers::pi;
+  rays_.clear();
+  cast_.clear();
   const double column_ns = 1e9 / (config_.turns_per_s * static_cast<double>(m.columns_per_frame));
   for (std::size_t c = 0; c < m.columns_per_packet; ++c) {
     drivers::OusterColumn& column = packet_.columns[c];
@@ -119,22 +120,26 @@ void OusterUnit::measure(hal::Time at) {
     column.frame_id = static_cast<std::uint16_t>((first + c) / m.columns_per_frame);
     column.encoder = column.measurement_id * 88U;
     column.status = 0xFFFFFFFF;
-    for (std::size_t row = 0; row < m.rows; ++row) {
-      BeamRay& ray = rays_[row * m.columns_per_packet + c];
-      const std::size_t beam = row * m.columns_per_frame + column.measurement_id;
-      ray.W_origin_m = T_W_S * S_origins_m_[beam];
-      ray.W_direction = T_W_S.linear() * S_directions_[beam];
-      ray.number = (first + c) * m.rows + row;
+  }
+  for (std::size_t row = 0; row < m.rows; ++row) {
+    if (m.beam_altitude_deg[row] * std::numbers::pi / 180 > highest) continue;
+    for (std::size_t c = 0; c < m.columns_per_packet; ++c) {
+      const std::size_t beam = row * m.columns_per_frame + packet_.columns[c].measurement_id;
+      cast_.push_back(row * m.columns_per_packet + c);
+      rays_.push_back({T_W_S * S_origins_m_[beam], T_W_S.linear() * S_directions_[beam],
+                       (first + c) * m.rows + row});
     }
   }
   packet_.frame_id = packet_.columns.front().frame_id;
-  if (config_.blind_in_motion && world_.moving()) return;
+  ranges_m_.resize(rays_.size());
   cast_bundle(world_.scene(), config_.ranges, mix(config_.seed), rays_, ranges_m_);
+  see_people(world_, config_.ranges, rays_, ranges_m_);
+  drivers::OusterReturn& told = packet_.returns[0];
   for (std::size_t i = 0; i < rays_.size(); ++i) {
     const double mm = ranges_m_[i] * 1000.0 * faults_.wrong_factor() + 0.5;
-    packet_.returns[0].range_mm[i] = mm < (1 << 19) ? static_cast<std::uint32_t>(mm) : 0;
-    packet_.returns[0].reflectivity[i] = ranges_m_[i] > 0 ? 30 : 0;
-    packet_.returns[0].signal[i] = ranges_m_[i] > 0 ? 400 : 0;
+    told.range_mm[cast_[i]] = mm < (1 << 19) ? static_cast<std::uint32_t>(mm) : 0;
+    told.reflectivity[cast_[i]] = ranges_m_[i] > 0 ? 30 : 0;
+    told.signal[cast_[i]] = ranges_m_[i] > 0 ? 400 : 0;
   }
 }
 

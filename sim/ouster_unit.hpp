@@ -1,6 +1,7 @@
 // An Ouster OS in the simulated world: real packets of whatever profile its metadata name.
 #pragma once
 
+#include <numbers>
 #include <optional>
 #include <string>
 #include <vector>
@@ -21,9 +22,9 @@ struct OusterUnitConfig {
   double skew = 20e-6;  // Of its crystal: seconds of its own per ours, less 1.
   ScannerModel ranges;  // Of it the ranges, their noise and the losses count.
   std::uint64_t seed = 1;
-  // While the robot moves, beams tell what they told before: nobody may use a scan taken in motion,
-  // and to cast all these beams would cost more than the rest of a mission.
-  bool blind_in_motion{};
+  // While the robot moves, beams above this elevation tell what they told before: nobody may use a
+  // scan taken in motion, and to cast all these beams would cost more than the rest of a mission.
+  double in_motion_max_rad = std::numbers::pi / 2;
   // What it serves over HTTP; metadata_text empty: sample_ouster_metadata().
   std::string metadata_text;
   drivers::OusterSettings settings{"255.255.255.255", 7502, "NORMAL"};
@@ -64,7 +65,8 @@ class OusterUnit {
   std::vector<drivers::OusterAlert> alerts_;
   drivers::OusterPacket packet_;
   std::vector<Eigen::Vector3d> S_origins_m_, S_directions_;  // Row by row, by measurement.
-  std::vector<BeamRay> rays_;
+  std::vector<BeamRay> rays_;                                // Of the beams that are cast:
+  std::vector<std::size_t> cast_;  // which these are, as they stand in the packet.
   std::vector<float> ranges_m_;
   double own_ns_ = 1e9;
   std::uint64_t number_{};  // Of packets.

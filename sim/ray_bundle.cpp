@@ -55,4 +55,15 @@ void cast_bundle(const Scene& scene, const ScannerModel& model, std::uint64_t ke
   }
 }
 
+void see_people(const World& world, const ScannerModel& model, std::span<const BeamRay> rays,
+                std::span<float> ranges_m) {
+  if (world.people().empty()) return;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const double range_m = world.range_to_people_m(rays[i].W_origin_m, rays[i].W_direction);
+    const bool before = ranges_m[i] == 0 || range_m < static_cast<double>(ranges_m[i]);
+    if (!before || range_m > model.range_max_m) continue;
+    ranges_m[i] = range_m < model.range_min_m ? 0.0F : static_cast<float>(range_m);
+  }
+}
+
 }  // namespace sim

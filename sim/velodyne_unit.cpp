@@ -23,8 +23,6 @@ VelodyneUnit::VelodyneUnit(VelodyneUnitConfig config, World& world, hal::Clock& 
   packet_.mode = drivers::VelodyneReturn::strongest;
   packet_.product = config.product;
   packet_.points.resize(kBlocks * kPerBlock);
-  rays_.resize(packet_.points.size());
-  ranges_m_.resize(packet_.points.size());
 }
 
 VelodyneUnit::~VelodyneUnit() = default;
@@ -52,7 +50,10 @@ void VelodyneUnit::measure(hal::Time at) {
   const Eigen::Isometry3d T_W_S =
       (placed ? *placed : world_.robot()).T_W_S(world_.config().scanner.height_m);
   packet_.timestamp_us = static_cast<std::uint32_t>(own_us_);
-  for (std::size_t i = 0; i < rays_.size(); ++i) {
+  const double highest = world_.moving() ? config_.in_motion_max_rad : std::numbers::pi;
+  rays_.clear();
+  cast_.clear();
+  for (std::size_t i = 0; i < packet_.points.size(); ++i) {
     const std::size_t block = i / kPerBlock, laser = i % kLasers;
     const double delay_us =
         static_cast<double>(i / kLasers) * kCycle_us + static_cast<double>(laser) * kLaser_us;
@@ -62,18 +63,22 @@ void VelodyneUnit::measure(hal::Time at) {
           static_cast<std::uint16_t>(std::lround(azimuth_deg * 100) % 36000);
     const double azimuth = -azimuth_deg * kDeg;
     const double elevation = drivers::velodyne_elevation_deg(laser) * kDeg;
-    rays_[i].W_origin_m = T_W_S * Eigen::Vector3d(0, 0, drivers::velodyne_offset_m(laser));
-    rays_[i].W_direction = T_W_S.linear() * Eigen::Vector3d(std::cos(elevation) * std::cos(azimuth),
-                                                            std::cos(elevation) * std::sin(azimuth),
-                                                            std::sin(elevation));
-    rays_[i].number = number_ + i;
+    if (elevation > highest) continue;
+    cast_.push_back(i);
+    rays_.push_back({T_W_S * Eigen::Vector3d(0, 0, drivers::velodyne_offset_m(laser)),
+                     T_W_S.linear() * Eigen::Vector3d(std::cos(elevation) * std::cos(azimuth),
+                                                      std::cos(elevation) * std::sin(azimuth),
+                                                      std::sin(elevation)),
+                     number_ + i});
   }
-  if (config_.blind_in_motion && world_.moving()) return;
+  ranges_m_.resize(rays_.size());
   cast_bundle(world_.scene(), config_.ranges, mix(config_.seed), rays_, ranges_m_);
+  see_people(world_, config_.ranges, rays_, ranges_m_);
   for (std::size_t i = 0; i < rays_.size(); ++i) {
+    drivers::VelodynePoint& point = packet_.points[cast_[i]];
     const double steps = ranges_m_[i] * 500.0 * faults_.wrong_factor() + 0.5;
-    packet_.points[i].distance_2mm = steps < 65536 ? static_cast<std::uint16_t>(steps) : 0;
-    packet_.points[i].reflectivity = ranges_m_[i] > 0 ? 40 : 0;
+    point.distance_2mm = steps < 65536 ? static_cast<std::uint16_t>(steps) : 0;
+    point.reflectivity = ranges_m_[i] > 0 ? 40 : 0;
   }
 }
 

@@ -1,6 +1,8 @@
 // A Velodyne VLP-16 in the simulated world: real packets of single returns.
 #pragma once
 
+#include <numbers>
+
 #include "drivers/velodyne_codec.hpp"
 #include "hal/clock.hpp"
 #include "sim/links.hpp"
@@ -17,9 +19,9 @@ struct VelodyneUnitConfig {
   std::uint8_t product = 0x22;
   ScannerModel ranges;  // Of it the ranges, their noise and the losses count.
   std::uint64_t seed = 1;
-  // While the robot moves, beams tell what they told before: nobody may use a scan taken in motion,
-  // and to cast all these beams would cost more than the rest of a mission.
-  bool blind_in_motion{};
+  // While the robot moves, beams above this elevation tell what they told before: nobody may use a
+  // scan taken in motion, and to cast all these beams would cost more than the rest of a mission.
+  double in_motion_max_rad = std::numbers::pi / 2;
 };
 
 // Stands where World has the scanner, upright, and sends always: 754 packets a second. `wrong`
@@ -41,7 +43,8 @@ class VelodyneUnit {
   UnitFaults& faults_;
   FaultySender link_;
   drivers::VelodynePacket packet_;
-  std::vector<BeamRay> rays_;
+  std::vector<BeamRay> rays_;      // Of the beams that are cast:
+  std::vector<std::size_t> cast_;  // which these are, as they stand in the packet.
   std::vector<float> ranges_m_;
   double turned_{};  // Turns since the start.
   double own_us_{};

@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include "drivers/ouster.hpp"
@@ -40,7 +42,9 @@ class UdpScannerLoop : public drivers_test::LoopRig {
       config.ranges = exact();
       config.clock_start_us = clock_start_us;
       velodyne_unit.emplace(config, world, clock, wire->sender(), *faults);
-      device = std::make_unique<Velodyne>(VelodyneConfig{}, clock, wire->receiver());
+      VelodyneConfig its;
+      its.scan.look_max_rad = kLookMax_rad;
+      device = std::make_unique<Velodyne>(its, clock, wire->receiver());
       spawn(velodyne_unit->run());
     } else {
       sim::OusterUnitConfig config;
@@ -50,6 +54,7 @@ class UdpScannerLoop : public drivers_test::LoopRig {
       OusterConfig its;
       its.metadata = metadata();
       its.scan.turns = 2;
+      its.scan.look_max_rad = kLookMax_rad;
       device = std::make_unique<Ouster>(its, clock, wire->receiver());
       spawn(ouster_unit->run());
     }
@@ -72,12 +77,31 @@ class UdpScannerLoop : public drivers_test::LoopRig {
     }
     return worst_m;
   }
+  std::vector<hal::Turn> turns(int count) {
+    std::vector<hal::Turn> taken;
+    for (int i = 0; i < count; ++i) {
+      auto turn = result_of(device->next_turn());
+      if (!turn) {
+        ADD_FAILURE() << turn.error().message() << told(*device);
+        break;
+      }
+      taken.push_back(std::move(*turn));
+    }
+    return taken;
+  }
+
   static std::size_t measured(const hal::ScanCloud& cloud) {
     std::size_t count = 0;
     for (const float range_m : cloud.ranges_m) count += range_m > 0;
     return count;
   }
 
+  sim::UnitFaults* fresh_faults() {
+    faults.emplace(clock, 5);
+    return &*faults;
+  }
+
+  static constexpr double kLookMax_rad = 0.05;
   std::optional<sim::DatagramWire> wire;
   std::optional<sim::UnitFaults> faults;
   std::optional<sim::VelodyneUnit> velodyne_unit;
@@ -127,6 +151,158 @@ TEST_F(UdpScannerLoop, BeamsKeepToTheirCells) {
         ASSERT_NEAR(std::asin(d.z()), elevation, 0.1 * pattern.elevation_step_rad);
       }
   }
+}
+
+// Each beam of a turn against rays that are cast where it says that it went: within its column, and
+// as exactly as the packets tell.
+TEST_F(UdpScannerLoop, TurnsOnTheWayAreWhatRaysOfTheWorldMeet) {
+  for (const auto& [kind, count] : {std::pair(Kind::velodyne, 9U), {Kind::ouster, 18U}}) {
+    halt_all();
+    build(kind);
+    ASSERT_TRUE(scan());
+    ASSERT_TRUE(result_of(device->start()));
+    const auto taken = turns(3);
+    ASSERT_EQ(taken.size(), 3U);
+    const auto T_W_S = world.robot().T_W_S(world.config().scanner.height_m);
+    const std::vector<hal::BeamRow>& rows = taken[1].rows;
+    EXPECT_EQ(rows.size(), count);
+    EXPECT_LT(std::abs(rows[taken[1].level].elevation_rad), 1.01 * std::numbers::pi / 180);
+    EXPECT_LT(rows.back().elevation_rad, kLookMax_rad);
+    std::size_t beams = 0, known = 0;
+    for (const hal::BeamRow& row : rows)
+      for (std::size_t i = 0; i < row.ranges_m.size(); ++i) {
+        const double half = std::abs(taken[1].angle_step_rad) / 2;
+        const double angle = taken[1].angle_first_rad + double(i) * taken[1].angle_step_rad;
+        double nearest_m = 1e9, farthest_m = 0;
+        for (const double at : {angle - half, angle, angle + half}) {
+          const Vector3d way(std::cos(row.elevation_rad) * std::cos(at),
+                             std::cos(row.elevation_rad) * std::sin(at),
+                             std::sin(row.elevation_rad));
+          const auto hit =
+              scene.cast(T_W_S * Vector3d(0, 0, row.tip_z_m), T_W_S.linear() * way, 0.05, 50);
+          ASSERT_TRUE(hit);
+          nearest_m = std::min(nearest_m, hit->distance_m);
+          farthest_m = std::max(farthest_m, hit->distance_m);
+        }
+        ++beams;
+        if (std::isnan(row.ranges_m[i])) continue;
+        ++known;
+        ASSERT_GE(row.ranges_m[i], nearest_m - 0.004) << row.elevation_rad << " " << angle;
+        ASSERT_LE(row.ranges_m[i], farthest_m + 0.004) << row.elevation_rad << " " << angle;
+      }
+    EXPECT_GT(known, beams * 98 / 100);
+    EXPECT_NEAR(hal::seconds(taken[2].stamp - taken[1].stamp), 0.1, 0.003);
+  }
+}
+
+// A robot that turns on the spot: each beam is placed by where the robot was when it was measured.
+TEST_F(UdpScannerLoop, StampsOfTurnsTellWhereARobotThatTurnsLooked) {
+  for (const Kind kind : {Kind::velodyne, Kind::ouster}) {
+    halt_all();
+    build(kind);
+    ASSERT_TRUE(scan());
+    ASSERT_TRUE(result_of(device->start()));
+    std::map<hal::Time, hal::Pose2> went;
+    std::optional<hal::Profile> seen;
+    const hal::Time end = clock.now() + 2s;
+    while (clock.now() < end) {
+      ASSERT_TRUE(world.command({0, 0.7}));
+      run_for(5ms);
+      went[clock.now()] = world.robot().pose;
+      if (clock.now() + 200ms > end && !seen) seen = hal::level_profile(turns(1).at(0));
+    }
+    ASSERT_TRUE(seen);
+    double worst_m = 0;
+    for (std::size_t i = 0; i < seen->ranges_m.size(); ++i) {
+      if (!(seen->ranges_m[i] > 0)) continue;
+      const hal::Time at = seen->stamp + hal::from_seconds(double(i) * seen->beam_period_s);
+      const hal::Pose2 pose = std::prev(went.upper_bound(at))->second;
+      const double angle =
+          pose.heading_rad + seen->angle_first_rad + double(i) * seen->angle_step_rad;
+      const double away_m = double{seen->ranges_m[i]};
+      const double x = pose.position_m.x() + away_m * std::cos(angle);
+      const double y = pose.position_m.y() + away_m * std::sin(angle);
+      worst_m = std::max(worst_m, std::min(std::abs(std::abs(x) - 6), std::abs(std::abs(y) - 5)));
+    }
+    // Ticks of the world are 20 ms: 0.8 deg, 10 cm at 7 m. A turn of 0.1 s would be 4 deg off.
+    EXPECT_LT(worst_m, 0.16);
+  }
+}
+
+TEST_F(UdpScannerLoop, TurnsThatLostMuchAreNotTold) {
+  build(Kind::velodyne);
+  ASSERT_TRUE(scan());
+  EXPECT_EQ(result_of(device->next_profile()).error(), std::errc::operation_not_permitted);
+  ASSERT_TRUE(result_of(device->start()));
+  ASSERT_EQ(turns(1).size(), 1U);
+  sim::LinkFaults loss;
+  loss.loss = 0.5;
+  wire->set_faults(loss);
+  run_for(3s);
+  while (result_of(device->next_profile())) {
+  }
+  wire->set_faults({});
+  const auto again = turns(2);
+  ASSERT_EQ(again.size(), 2U);
+  EXPECT_GT(again[0].lost_before, 20U);
+  EXPECT_EQ(again[1].lost_before, 0U);
+  ASSERT_TRUE(result_of(device->stop()));
+  EXPECT_EQ(result_of(device->next_profile()).error(), std::errc::operation_not_permitted);
+  EXPECT_TRUE(scan()) << "it scans as before";
+}
+
+// Nobody takes them for a minute: the newest few wait, and the rest are counted.
+TEST_F(UdpScannerLoop, TurnsThatNobodyTakesAreBounded) {
+  build(Kind::ouster);
+  ASSERT_TRUE(scan());
+  ASSERT_TRUE(result_of(device->start()));
+  run_for(20s);
+  const auto taken = turns(5);
+  ASSERT_EQ(taken.size(), 5U);
+  EXPECT_GT(taken[0].lost_before, 180U);
+  EXPECT_GT(taken[0].stamp, clock.now() - 1s);
+}
+
+// A person who stands before the wall is seen, and nothing comes back of one who is too near.
+TEST_F(UdpScannerLoop, PeopleAreSeen) {
+  for (const Kind kind : {Kind::velodyne, Kind::ouster})
+    for (const double away_m : {2.0, 0.6}) {
+      halt_all();
+      sim::WorldConfig config = world_config();
+      config.people = {{.way_m = {{1.0 + away_m, -0.5}}}};
+      sim::World crowded(scene, config);
+      ASSERT_TRUE(crowded.put_robot({{1.0, -0.5}, 0}, 0));
+      wire.emplace(clock);
+      sim::ScannerModel ranges = exact();
+      ranges.range_min_m = 0.8;
+      sim::VelodyneUnitConfig vlp;
+      sim::OusterUnitConfig os;
+      vlp.ranges = os.ranges = ranges;
+      os.metadata = metadata();
+      std::optional<sim::VelodyneUnit> vlp_unit;
+      std::optional<sim::OusterUnit> os_unit;
+      if (kind == Kind::velodyne) {
+        vlp_unit.emplace(vlp, crowded, clock, wire->sender(), *fresh_faults());
+        device = std::make_unique<Velodyne>(VelodyneConfig{}, clock, wire->receiver());
+        spawn(vlp_unit->run());
+      } else {
+        OusterConfig its;
+        its.metadata = metadata();
+        os_unit.emplace(os, crowded, clock, wire->sender(), *fresh_faults());
+        device = std::make_unique<Ouster>(its, clock, wire->receiver());
+        spawn(os_unit->run());
+      }
+      spawn(device->run());
+      ASSERT_TRUE(scan());
+      ASSERT_TRUE(result_of(device->start()));
+      const auto taken = turns(2);
+      const hal::Profile turn = hal::level_profile(taken.at(1));
+      const auto ahead = static_cast<std::size_t>(
+          std::lround((-2 * std::numbers::pi - turn.angle_first_rad) / turn.angle_step_rad));
+      const double near_m = away_m - sim::Person{}.radius_m;
+      EXPECT_NEAR(turn.ranges_m.at(ahead), near_m < 0.8 ? 0 : near_m, 0.02);
+      halt_all();
+    }
 }
 
 TEST_F(UdpScannerLoop, TheHourOfAVlp16MayTurnDuringAScan) {
