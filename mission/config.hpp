@@ -88,10 +88,10 @@ struct CorrectionsConfig {
   bool tells_position = false;    // The mountpoint is of a network that must know where it is.
 };
 
-// [obstacles]: a profile scanner that looks level while the robot drives. Without one the robot
-// drives by its map and learns of what that lacks from its scans, or by touching it.
+// [obstacles]: a Hokuyo that looks level while the robot drives, or its [scanner]: see look.hpp.
+// Without one it drives by its map and learns of what that lacks from its scans, or by touching it.
 struct ObstaclesConfig {
-  std::string device = "none";  // or "hokuyo"
+  std::string device = "none";  // or "hokuyo", "scanner"
   std::string link = "tcp:192.168.0.10:10940";
   std::string model;  // How what it says it is begins; empty: any.
   double height_m = 0.3;

@@ -263,20 +263,25 @@ SectionSpec pan_section() {
 SectionSpec obstacles_section() {
   using O = ObstaclesConfig;
   const Keys<O> keys{[](MissionConfig& c) -> O& { return c.robot.obstacles; }};
-  return {ConfigFile::robot,
-          "obstacles",
-          "What looks level ahead while the robot drives: it slows down and stops for what is in "
-          "the way, waits, and goes round.",
-          {keys.other("device", &O::device, "A Hokuyo, or none", {"none", "hokuyo"}),
-           keys.other("link", &O::link, "Where it is: tcp:HOST:10940, serial:/dev/ttyACM2@115200"),
-           keys.other("model", &O::model, "How what it says it is begins, such as `UST-20LX`"),
-           keys.number("height_m", &O::height_m, 0.02, 3, "m",
-                       "Above the ground: it sees nothing lower"),
-           keys.number("offset_x_m", &O::offset_x_m, -2, 2, "m", "Ahead of the robot's middle"),
-           keys.number("patience_s", &O::patience_s, 0, 600, "s",
-                       "What is in the way for longer is gone round")},
-          {},
-          {}};
+  return {
+      ConfigFile::robot,
+      "obstacles",
+      "What looks ahead while the robot drives: it slows down and stops for what is in the way, "
+      "waits, and goes round.",
+      {keys.other("device", &O::device,
+                  "A Hokuyo that looks level; the `[scanner]` itself, where that is a VLP-16 or an "
+                  "Ouster: then "
+                  "of these keys only `patience_s` counts; or none",
+                  {"none", "hokuyo", "scanner"}),
+       keys.other("link", &O::link, "Where it is: tcp:HOST:10940, serial:/dev/ttyACM2@115200"),
+       keys.other("model", &O::model, "How what it says it is begins, such as `UST-20LX`"),
+       keys.number("height_m", &O::height_m, 0.02, 3, "m",
+                   "Above the ground: it sees nothing lower"),
+       keys.number("offset_x_m", &O::offset_x_m, -2, 2, "m", "Ahead of the robot's middle"),
+       keys.number("patience_s", &O::patience_s, 0, 600, "s",
+                   "What is in the way for longer is gone round")},
+      {},
+      {}};
 }
 
 SectionSpec imu_section() {

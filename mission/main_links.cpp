@@ -26,8 +26,9 @@ struct Role {
 
 const std::string kNone;
 
+// With a link of its own.
 bool has_obstacles(const RobotConfig& robot) {
-  return robot.obstacles.device != "none";
+  return robot.obstacles.device == "hokuyo";
 }
 
 std::vector<Role> roles_of(const RobotConfig& robot) {

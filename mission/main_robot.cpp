@@ -20,6 +20,7 @@
 #include "drivers/vn100.hpp"
 #include "hal/angles.hpp"
 #include "hal/together.hpp"
+#include "mission/look.hpp"
 #include "mission/main_corrections.hpp"
 #include "mission/main_scanner.hpp"
 
@@ -116,9 +117,11 @@ void RobotDrivers::add_scanner(const RobotConfig& config, const Links& links) {
   const ScannerConfig& scanner = config.scanner;
   if (scanner.device == "vlp16") {
     drivers::VelodyneConfig velodyne;
+    velodyne.scan.look_max_rad = look_max_rad();
     add_turning(config, std::make_unique<drivers::Velodyne>(velodyne, clock_, *links.packets));
   } else if (scanner.device == "ouster") {
     drivers::OusterConfig ouster{.scan = {}, .metadata = ouster_file(scanner).metadata};
+    ouster.scan.look_max_rad = look_max_rad();
     add_turning(config, std::make_unique<drivers::Ouster>(std::move(ouster), clock_, *links.packets,
                                                           ouster_api(config, links)));
   } else if (scanner.device == "hokuyo") {
@@ -140,6 +143,7 @@ template <class T>
 void RobotDrivers::add_turning(const RobotConfig& config, std::unique_ptr<T> scanner) {
   T& device = own("scanner", config.scanner.link, std::move(scanner));
   scanner_ = &device;
+  if (looks_with_scanner(config)) obstacles_ = &device;
   scan_problem_ = [&device]() -> const std::string& { return device.problem(); };
 }
 
@@ -204,7 +208,7 @@ void RobotDrivers::add_ublox(const RobotConfig& config, const drivers::GnssOutpu
 
 // Ten scans a second are enough for what moves at a walk, and the newest are what counts.
 void RobotDrivers::add_obstacles(const RobotConfig& config, const Links& links) {
-  if (config.obstacles.device == "none" || !links.obstacles) return;
+  if (config.obstacles.device != "hokuyo" || !links.obstacles) return;
   drivers::HokuyoConfig hokuyo;
   hokuyo.model = config.obstacles.model;
   hokuyo.skip = kObstacleTurnsSkipped;

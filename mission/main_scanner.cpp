@@ -10,6 +10,7 @@
 #include "drivers/link_address.hpp"
 #include "hal/angles.hpp"
 #include "mission/files.hpp"
+#include "mission/look.hpp"
 #include "mission/main_corrections.hpp"
 #include "mission/main_robot.hpp"
 
@@ -161,10 +162,38 @@ void check_ouster(const ScannerConfig& scanner, Problems& problems) {
       problems);
 }
 
+// What turns by itself looks all round ten times a second; a profile scanner on a pan unit stands
+// upright, and shows one direction at a time.
+void check_look(const RobotConfig& robot, Problems& problems) {
+  if (needs_pan(robot.scanner))
+    return problems.add(
+        "obstacles.device",
+        "a scanner on a pan unit cannot look ahead on the way, only a vlp16 or an "
+        "ouster can: give [obstacles] a hokuyo of its own, or set device = \"none\"");
+  for (const char* key : {"link", "model", "height_m", "offset_x_m"})
+    if (problems.written(std::string("obstacles.") + key))
+      problems.add(
+          std::string("obstacles.") + key,
+          std::string("the [scanner] itself looks ahead, from where it is: leave out ") + key);
+  if (robot.scanner.device != "ouster") return;
+  const OusterFile file = ouster_file(robot.scanner);
+  const auto [first, last] = file.metadata.column_window;
+  if (file.problem.empty() && last - first + 1 != file.metadata.columns_per_frame)
+    problems.add("obstacles.device",
+                 fmt::format("the sensor measures only columns {} to {} of {}: set its azimuth "
+                             "window to all round, and save its metadata anew",
+                             first, last, file.metadata.columns_per_frame));
+}
+
 }  // namespace
 
 bool needs_pan(const ScannerConfig& scanner) {
   return scanner.device != "vlp16" && scanner.device != "ouster";
+}
+
+// Higher than this passes over the robot 2 m ahead, and farther away over what could come near it.
+double look_max_rad() {
+  return std::atan2(0.1, 2.0);
 }
 
 drivers::SweepMount mount_of(const ScannerConfig& scanner) {
@@ -256,6 +285,7 @@ std::vector<ConfigError> robot_problems(const MissionConfig& config) {
     check_hokuyo(robot, problems);
   else
     check_lms(robot, problems);
+  if (looks_with_scanner(robot)) check_look(robot, problems);
   if (const CorrectionsProblem problem = corrections_problem(robot); !problem.text.empty())
     problems.add(problem.key, problem.text);
   return problems.take();

@@ -19,6 +19,9 @@ inline constexpr double kPanAcceleration_radps2 = 0.5;
 // packets.
 bool needs_pan(const ScannerConfig& scanner);
 
+// On the way, beams of what turns by itself that go higher than this are not looked at.
+double look_max_rad();
+
 // Of a profile scanner: how it hangs on the pan axis, and what a scan of both covers.
 drivers::SweepMount mount_of(const ScannerConfig& scanner);
 drivers::SweepField field_of(const ScannerConfig& scanner);

@@ -2,6 +2,7 @@
 
 #include "hal/angles.hpp"
 #include "hal/together.hpp"
+#include "mission/look.hpp"
 #include "mission/main_corrections.hpp"
 #include "mission/main_scanner.hpp"
 
@@ -33,11 +34,11 @@ RobotUnits::RobotUnits(const RobotConfig& config, const drivers::GeoAnchor& anch
     : seed_(seed), world_(world), clock_(clock), supply_(sim::BatteryConfig{}, world) {
   if (links.drive) add_drive(config, links);
   if (links.scanner && links.pan && needs_pan(config.scanner)) add_sweep(config, threads, links);
-  if (links.packets && !needs_pan(config.scanner)) add_turning(config.scanner, links);
+  if (links.packets && !needs_pan(config.scanner)) add_turning(config, links);
   if (links.imu)
     imu_.emplace(sim::Vn100UnitConfig{}, world_, clock_, *links.imu, add_faults("imu"));
   if (links.gnss) add_gnss(config, anchor, links);
-  if (links.obstacles && config.obstacles.device != "none") add_obstacles(config, threads, links);
+  if (links.obstacles && config.obstacles.device == "hokuyo") add_obstacles(config, threads, links);
   add_power(config.power);
   if (links.corrections && has_corrections(config))
     add_corrections(config.corrections, anchor, *links.corrections);
@@ -115,7 +116,10 @@ void RobotUnits::add_obstacles(const RobotConfig& config, int threads, const Uni
   obstacles_.emplace(hokuyo, world_, clock_, *links.obstacles, add_faults("obstacles"), level_);
 }
 
-void RobotUnits::add_turning(const ScannerConfig& config, const UnitLinks& links) {
+// Of a robot in motion only the beams that look ahead are wanted.
+void RobotUnits::add_turning(const RobotConfig& robot, const UnitLinks& links) {
+  const ScannerConfig& config = robot.scanner;
+  const double in_motion_max_rad = looks_with_scanner(robot) ? look_max_rad() : -hal::radians(90);
   sim::DatagramSender& packets = *links.packets;
   if (config.device == "ouster") {
     sim::OusterUnitConfig ouster;
@@ -126,7 +130,7 @@ void RobotUnits::add_turning(const ScannerConfig& config, const UnitLinks& links
         links.packets_port != 0 ? links.packets_port : packets_port(config);
     ouster.ranges = world_.config().scanner;
     ouster.seed = seed_;
-    ouster.in_motion_max_rad = -hal::radians(90);
+    ouster.in_motion_max_rad = in_motion_max_rad;
     ouster_.emplace(std::move(ouster), world_, clock_, packets, add_faults("scanner"),
                     asks_ouster(config) ? links.scanner_api : nullptr);
     return;
@@ -134,7 +138,7 @@ void RobotUnits::add_turning(const ScannerConfig& config, const UnitLinks& links
   sim::VelodyneUnitConfig velodyne;
   velodyne.ranges = world_.config().scanner;
   velodyne.seed = seed_;
-  velodyne.in_motion_max_rad = -hal::radians(90);
+  velodyne.in_motion_max_rad = in_motion_max_rad;
   velodyne_.emplace(velodyne, world_, clock_, packets, add_faults("scanner"));
 }
 

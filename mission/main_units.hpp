@@ -74,7 +74,7 @@ class RobotUnits {
   void add_drive(const RobotConfig& config, const UnitLinks& links);
   void add_sweep(const RobotConfig& config, int threads, const UnitLinks& links);
   void add_obstacles(const RobotConfig& config, int threads, const UnitLinks& links);
-  void add_turning(const ScannerConfig& config, const UnitLinks& links);
+  void add_turning(const RobotConfig& robot, const UnitLinks& links);
   void add_gnss(const RobotConfig& config, const drivers::GeoAnchor& anchor,
                 const UnitLinks& links);
   void add_power(const PowerConfig& config);

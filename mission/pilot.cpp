@@ -7,6 +7,7 @@
 
 #include "hal/angles.hpp"
 #include "hal/together.hpp"
+#include "mission/look.hpp"
 #include "nav/polygons.hpp"
 
 namespace mission {
@@ -23,12 +24,15 @@ constexpr hal::Duration kBlindPatience = std::chrono::seconds(30);
 constexpr hal::Duration kBlindAfter = std::chrono::milliseconds(350);  // Without a profile.
 // What was closed for now is taken to be open again after so long: it is seen anew if it is there.
 constexpr hal::Duration kClosedForNow = std::chrono::minutes(2);
-constexpr double kKeepM = 0.04;        // From what it drives past: what profiles are sure of.
-constexpr double kSeenSideM = 0.2;     // Square that is closed around a point that was seen,
-constexpr double kWallSideM = 0.12;    // the same before a wall of the map,
-constexpr double kSeenAroundM = 3.0;   // so far around what is in the way,
-constexpr double kKnownWallM = 0.15;   // but not along the walls of the map.
-constexpr double kNearEnoughM = 0.25;  // Of a goal that cannot be reached.
+constexpr double kKeepM = 0.04;         // From what it drives past: what profiles are sure of.
+constexpr double kSeenSideM = 0.2;      // Square that is closed around a point that was seen,
+constexpr double kWallSideM = 0.12;     // the same before a wall of the map,
+constexpr double kSeenAroundM = 3.0;    // so far around what is in the way,
+constexpr double kKnownWallM = 0.15;    // but not along the walls of the map.
+constexpr double kBlindSlackM = 0.1;    // Beyond a scanner's least range: its cells and its noise.
+constexpr double kAboveScannerM = 0.1;  // The robot is so much higher than its scanner,
+constexpr double kWallsAboveScannerM = 0.7;  // and walls are looked at up to so much above it.
+constexpr double kNearEnoughM = 0.25;        // Of a goal that cannot be reached.
 constexpr hal::Duration kAskAgain = std::chrono::milliseconds(200);
 // Profiles are laid over walls so far apart, or turned by so much; and so far where it stands.
 constexpr double kLaidEveryM = 1, kLaidEveryRad = 0.35, kLaidStandingM = 0.2;
@@ -80,6 +84,14 @@ nav::ZoneConfig zone_config(const BodyConfig& body) {
   return config;
 }
 
+nav::ObstacleMapConfig obstacle_config(const RobotConfig& robot) {
+  nav::ObstacleMapConfig config;
+  if (!looks_with_scanner(robot)) return config;
+  config.blind_m = robot.scanner.range_min_m + kBlindSlackM;
+  config.top_m = robot.scanner.height_m + kAboveScannerM;
+  return config;
+}
+
 nav::FollowConfig follow_config(const BodyConfig& body) {
   nav::FollowConfig config;
   config.speed_max_mps = body.speed_max_mps;
@@ -117,7 +129,8 @@ Pilot::Pilot(const RobotConfig& config, hal::Clock& clock, hal::Devices& devices
       devices_(devices),
       localizer_(localizer_config(config), start, covariance),
       alone_(localizer_),
-      sensors_(clock.now()) {}
+      sensors_(clock.now()),
+      obstacles_(obstacle_config(config)) {}
 
 hal::Task<void> Pilot::track() {
   using boost::asio::experimental::awaitable_operators::operator&&;
@@ -173,6 +186,8 @@ nav::Correction Pilot::correct_by_map(const hal::Pose2& pose, const Eigen::Matri
 }
 
 hal::Task<void> Pilot::track_obstacles() {
+  auto* turning = dynamic_cast<hal::TurnScanner*>(devices_.obstacles);
+  if (turning != nullptr && looks_with_scanner(config_)) co_await track_turns(*turning);
   while (devices_.obstacles) {
     const auto profile = co_await devices_.obstacles->next_profile();
     if (!profile) {
@@ -186,6 +201,21 @@ hal::Task<void> Pilot::track_obstacles() {
     looked_at_ = clock_.now();
     obstacles_.add(*profile, looks_from, clock_.now());
     if (walls_) profile_ = std::move(*profile);
+  }
+}
+
+hal::Task<void> Pilot::track_turns(hal::TurnScanner& scanner) {
+  for (;;) {
+    auto turn = co_await scanner.next_turn();
+    if (!turn) {
+      co_await clock_.sleep_for(kAskAgain);
+      continue;
+    }
+    looked_at_ = clock_.now();
+    if (walls_) profile_ = hal::level_profile(*turn);
+    const hal::Pose2 W_first = localizer_.pose_at(turn->stamp);
+    const hal::Pose2 W_last = localizer_.pose_at(turn->last_at());
+    obstacles_.add({std::move(*turn), look_height_m(config_), W_first, W_last}, clock_.now());
   }
 }
 
@@ -224,15 +254,17 @@ hal::Task<void> Pilot::lay_over_walls() {
   const auto beams = static_cast<double>(seen.profile.ranges_m.size());
   const hal::Time last =
       seen.profile.stamp + hal::from_seconds(std::max(0.0, beams - 1) * seen.profile.beam_period_s);
-  seen.T_B_L = {{config_.obstacles.offset_x_m, 0}, 0};
-  seen.height_m = config_.obstacles.height_m;
+  seen.T_B_L = {{look_offset_x_m(config_), 0}, 0};
+  seen.height_m = look_height_m(config_);
   seen.R_level = Eigen::AngleAxisd(-pose().heading_rad, Eigen::Vector3d::UnitZ()) *
                  localizer_.T_W_B().linear();
   seen.W_first = localizer_.pose_at(seen.profile.stamp);
   seen.W_last = localizer_.pose_at(last);
+  nav::ProfileMatchConfig how;
+  if (looks_with_scanner(config_)) how.high_m = seen.height_m + kWallsAboveScannerM;
   nav::ProfileMatch found;
-  const std::function<void()> lay = [&found, &seen, walls = walls_, sigmas = covariance()] {
-    found = nav::match_profile(*walls, seen, sigmas);
+  const std::function<void()> lay = [&found, &seen, &how, walls = walls_, sigmas = covariance()] {
+    found = nav::match_profile(*walls, seen, sigmas, how);
   };
   co_await compute_->run(lay);
   if (!found.match.good) {
@@ -258,7 +290,7 @@ hal::Task<LegEnd> Pilot::drive_to(Roads& roads, hal::Pose2 goal) {
   looks_since_.reset();
   if (devices_.obstacles) (void)co_await devices_.obstacles->stop();
   profile_.reset();
-  obstacles_.clear();  // By the next leg the world has moved on.
+  obstacles_.clear_but_hidden();  // By the next leg the world has moved on.
   leg.driven_m = travelled_m_ - before_m;
   leg.short_of_goal_m = (goal.position_m - pose().position_m).norm();
   if (leg.arrived) leg.reason.clear();
@@ -440,7 +472,7 @@ hal::Task<void> Pilot::abandon() {
   co_await hal::first_of(halt(), clock_.sleep_for(kHaltWait));
   if (devices_.obstacles) (void)co_await devices_.obstacles->stop();
   profile_.reset();
-  obstacles_.clear();
+  obstacles_.clear_but_hidden();
 }
 
 hal::Task<void> Pilot::back_off() {

@@ -10,6 +10,7 @@
 #include "hal/clock.hpp"
 #include "hal/compute.hpp"
 #include "hal/devices.hpp"
+#include "hal/turn_scanner.hpp"
 #include "mission/config.hpp"
 #include "mission/record.hpp"
 #include "mission/roads.hpp"
@@ -39,6 +40,10 @@ nav::FollowConfig follow_config(const BodyConfig& body);
 
 // How a robot of this body slows down and stops for what is in its way.
 nav::ZoneConfig zone_config(const BodyConfig& body);
+
+// What a robot takes for an obstacle: with a scanner that has rows, what lies between the ground
+// and its own height.
+nav::ObstacleMapConfig obstacle_config(const RobotConfig& robot);
 
 // How long it takes along the route, from pose to pose and until it stands: the follower at work on
 // a robot that does exactly as told.
@@ -106,6 +111,7 @@ class Pilot {
   hal::Task<void> track_imu();
   hal::Task<void> track_gnss();
   hal::Task<void> track_obstacles();
+  hal::Task<void> track_turns(hal::TurnScanner& scanner);
   hal::Task<void> track_walls();
   bool wants_walls() const;
   bool has_good_gnss() const;

@@ -7,6 +7,7 @@
 #include "hal/together.hpp"
 #include "mission/disk_fault.hpp"
 #include "mission/json_text.hpp"
+#include "mission/look.hpp"
 
 namespace mission {
 namespace {
@@ -93,7 +94,7 @@ Survey::Survey(const MissionConfig& config, const nav::SiteMap& map, SiteTasks t
       walls_(parts.devices.obstacles == nullptr
                  ? std::nullopt
                  : std::optional<WallsSoFar>(std::in_place, map, config.localize.match_map,
-                                             config.robot.obstacles.height_m)),
+                                             look_height_m(config.robot))),
       registrar_(config.registration, config.robot.scanner, threads),
       energy_(config.robot.battery, config.robot.scanner.scan_s) {
   record_.mission = config.name;

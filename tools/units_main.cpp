@@ -73,7 +73,7 @@ Served serve(const Options& options, const mission::RobotConfig& robot, asio::io
   else
     served.scanner = port();
   if (mission::needs_pan(robot.scanner)) served.pan = pty("pan", kPanBaud);
-  if (robot.obstacles.device != "none") served.obstacles = port();
+  if (robot.obstacles.device == "hokuyo") served.obstacles = port();
   served.imu = pty("imu", kImuBaud);
   if (robot.gnss.device == "gpsd")
     served.gpsd = port();

@@ -42,6 +42,19 @@ TEST(RobotProblems, CompareWhatIsAskedWithWhatTheScannerHas) {
               HasSubstr("api/v1/sensor/metadata"));
 }
 
+TEST(RobotProblems, SayWhichScannersCanLookAheadAndWhatIsThenLeftOut) {
+  const std::string look = "[obstacles]\ndevice = 'scanner'\n";
+  EXPECT_THAT(problems("[scanner]\nazimuth_step_deg = 0.2\n" + look),
+              HasSubstr("a scanner on a pan unit cannot look ahead"));
+  const std::string vlp16 =
+      "[scanner]\ndevice = 'vlp16'\nlink = 'udp:2368'\nelevation_min_deg = -15\n"
+      "elevation_max_deg = 15\nelevation_step_deg = 2\nazimuth_step_deg = 0.2\nfov_deg = 360\n";
+  EXPECT_EQ(problems(vlp16 + look + "patience_s = 3.0\n"), "");
+  const std::string refusal = problems(vlp16 + look + "height_m = 0.3\nlink = 'tcp:a:10940'\n");
+  EXPECT_THAT(refusal, HasSubstr("leave out height_m"));
+  EXPECT_THAT(refusal, HasSubstr("leave out link"));
+}
+
 // One mission with each robot that ships, on a small site; how much of what it could see it must
 // have seen was measured once and is held.
 struct Shipped {

@@ -52,6 +52,7 @@ class Fort {
     const std::string sim = "[sim]\n";
     robot.insert(robot.find(sim) + sim.size(), "gnss_outage = \"inner\"\n");
     std::ofstream(folder_.path() / "robot.toml") << robot;
+    std::filesystem::copy_file(configs / "robots" / "os1_32.json", folder_.path() / "os1_32.json");
     std::ofstream(folder_.path() / "fort.toml")
         << "robot = \"robot.toml\"\nsite = \"" << (configs / "sites" / "fort").string()
         << "\"\n[regions]\ninner = \"robot\"\nouter = \"" << regions << "\"\nmoat = \"" << regions
@@ -118,6 +119,24 @@ TEST(FortPoses, OfARobotThatLooksAheadAreAsPromisedOnArrival) {
   fort.expect_as_promised_on_arrival();
   fort.expect_as_promised();
 }
+
+// And with robots whose only eye is the scanner of their scans: a VLP-16, an Ouster.
+class FortPosesOfScanner : public testing::TestWithParam<const char*> {};
+
+TEST_P(FortPosesOfScanner, AreAsPromisedOnArrival) {
+  Fort fort("skip", GetParam());
+  for (int seed = 1; seed <= (nightly() ? 50 : 2); ++seed) fort.run(seed);
+  EXPECT_GE(fort.arrived.position_m.size(), 8U);
+  std::printf("%s", in_words("on arrival", fort.arrived).c_str());
+  fort.expect_as_promised_on_arrival();
+}
+
+INSTANTIATE_TEST_SUITE_P(FortPoses, FortPosesOfScanner,
+                         testing::Values("bunker_vlp16.toml", "scout_ouster.toml"),
+                         [](const auto& param) {
+                           const std::string name = param.param;
+                           return name.substr(0, name.find('.'));
+                         });
 
 // All 27 stations, those of a person too, and all pairs together when the tour closes: ten seeds
 // each, as one takes half a minute and more.
