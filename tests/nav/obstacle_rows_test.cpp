@@ -77,16 +77,16 @@ ObstacleMap map_of_vlp16() {
   return ObstacleMap(config);
 }
 
-Time at_ms(int ms) {
+Time rows_at_ms(int ms) {
   return Time(milliseconds(ms));
 }
 
-const hal::Pose2 kHere{{0, 0}, 0};
+const hal::Pose2 kRobotHere{{0, 0}, 0};
 const Post kPerson{{3, 0.5}, 0.25, 0, 1.75};
 
 TEST(ObstacleRows, HoldAPersonAndNotTheGround) {
   ObstacleMap map = map_of_vlp16();
-  map.add(turn({kPerson}, kHere), at_ms(0));
+  map.add(turn({kPerson}, kRobotHere), rows_at_ms(0));
   ASSERT_FALSE(map.points_m().empty());
   for (const Vector2d& point : map.points_m())
     EXPECT_NEAR((point - kPerson.center_m).norm(), kPerson.radius_m, 0.002);
@@ -95,9 +95,9 @@ TEST(ObstacleRows, HoldAPersonAndNotTheGround) {
 // 5 % uphill is ground still; a wall is not.
 TEST(ObstacleRows, LetTheGroundRiseALittle) {
   ObstacleMap map = map_of_vlp16();
-  map.add(turn({}, kHere, {0.05}), at_ms(0));
+  map.add(turn({}, kRobotHere, {0.05}), rows_at_ms(0));
   EXPECT_TRUE(map.points_m().empty());
-  map.add(turn({}, kHere, {0.3}), at_ms(100));
+  map.add(turn({}, kRobotHere, {0.3}), rows_at_ms(100));
   EXPECT_FALSE(map.points_m().empty());
 }
 
@@ -105,22 +105,22 @@ TEST(ObstacleRows, LetTheGroundRiseALittle) {
 TEST(ObstacleRows, PlaceEachBeamWhereTheRobotWas) {
   ObstacleMap map = map_of_vlp16();
   const hal::Pose2 last{{0.1, 0.02}, 0.157};
-  map.add(turn({kPerson}, kHere, last), at_ms(0));
-  map.add(turn({kPerson}, last, {{0.2, 0.06}, 0.314}), at_ms(100));
+  map.add(turn({kPerson}, kRobotHere, last), rows_at_ms(0));
+  map.add(turn({kPerson}, last, {{0.2, 0.06}, 0.314}), rows_at_ms(100));
   ASSERT_FALSE(map.points_m().empty());
   for (const Vector2d& point : map.points_m())
     EXPECT_NEAR((point - kPerson.center_m).norm(), kPerson.radius_m, 0.002);
   // And it is found empty where it was, though the robot turns on.
   const Post backdrop{{24, 0.5}, 16, 0, 5};
-  map.add(turn({backdrop}, {{0.2, 0.06}, 0.314}, {{0.3, 0.1}, 0.47}), at_ms(200));
+  map.add(turn({backdrop}, {{0.2, 0.06}, 0.314}, {{0.3, 0.1}, 0.47}), rows_at_ms(200));
   EXPECT_TRUE(map.points_m().empty());
 }
 
 TEST(ObstacleRows, AreEmptyAgainWhereSomebodyWalkedAway) {
   ObstacleMap map = map_of_vlp16();
-  map.add(turn({kPerson}, kHere), at_ms(0));
-  map.add(turn({kPerson}, kHere), at_ms(100));
-  for (int i = 2; i < 9; ++i) map.add(turn({}, kHere), at_ms(100 * i));
+  map.add(turn({kPerson}, kRobotHere), rows_at_ms(0));
+  map.add(turn({kPerson}, kRobotHere), rows_at_ms(100));
+  for (int i = 2; i < 9; ++i) map.add(turn({}, kRobotHere), rows_at_ms(100 * i));
   EXPECT_TRUE(map.points_m().empty());
 }
 
@@ -130,14 +130,15 @@ TEST(ObstacleRows, KeepALowCrateThatTheRobotHasComeTooNearToSee) {
   const Post crate{{4.5, 0}, 0.4, 0, 0.5};
   ObstacleMap map = map_of_vlp16();
   int ms = 0;
-  for (double x = 0; x < 3; x += 0.1, ms += 100) map.add(turn({crate}, {{x, 0}, 0}), at_ms(ms));
+  for (double x = 0; x < 3; x += 0.1, ms += 100)
+    map.add(turn({crate}, {{x, 0}, 0}), rows_at_ms(ms));
   const std::size_t before = map.points_m().size();
   EXPECT_GT(before, 3U);
-  for (int i = 0; i < 400; ++i) map.add(turn({crate}, {{3, 0}, 0}), at_ms(ms += 100));
+  for (int i = 0; i < 400; ++i) map.add(turn({crate}, {{3, 0}, 0}), rows_at_ms(ms += 100));
   EXPECT_EQ(map.points_m().size(), before);
   map.clear_but_hidden();
   EXPECT_EQ(map.points_m().size(), before);
-  for (int i = 0; i < 100; ++i) map.add(turn({}, {{3, 0}, 0}), at_ms(ms += 1000));
+  for (int i = 0; i < 100; ++i) map.add(turn({}, {{3, 0}, 0}), rows_at_ms(ms += 1000));
   EXPECT_TRUE(map.points_m().empty()) << "nothing was heard of it for two minutes";
 }
 
@@ -148,7 +149,7 @@ TEST(ObstacleRows, AreNotTakenOutByBeamsThatPassOverThem) {
   int ms = 0;
   bool seen = false;
   for (double x = 0; x < 1.4; x += 0.02, ms += 20) {
-    map.add(turn({bar, backdrop}, {{x, 0}, 0}), at_ms(ms));
+    map.add(turn({bar, backdrop}, {{x, 0}, 0}), rows_at_ms(ms));
     seen = seen || !map.points_m().empty();
     EXPECT_EQ(map.points_m().empty(), !seen) << x;
   }
@@ -165,19 +166,19 @@ TEST(ObstacleRows, KeepWhatIsNearerThanTheScannerMeasures) {
     return std::ranges::count_if(map.points_m(),
                                  [](const Vector2d& point) { return std::abs(point.y()) < 0.05; });
   };
-  map.add(turn({near}, {{-0.2, 0}, 0}), at_ms(0));
+  map.add(turn({near}, {{-0.2, 0}, 0}), rows_at_ms(0));
   ASSERT_GT(in_the_middle(), 0);
-  for (int i = 1; i < 50; ++i) map.add(turn({near}, kHere), at_ms(100 * i));
+  for (int i = 1; i < 50; ++i) map.add(turn({near}, kRobotHere), rows_at_ms(100 * i));
   EXPECT_GT(in_the_middle(), 0);
 }
 
 TEST(ObstacleRows, SayNothingWhereNothingIsKnown) {
   ObstacleMap map = map_of_vlp16();
-  map.add(turn({kPerson}, kHere), at_ms(0));
-  MovingTurn lost = turn({}, kHere);
+  map.add(turn({kPerson}, kRobotHere), rows_at_ms(0));
+  MovingTurn lost = turn({}, kRobotHere);
   for (hal::BeamRow& row : lost.turn.rows)
     for (float& range : row.ranges_m) range = NAN;
-  for (int i = 1; i < 50; ++i) map.add(lost, at_ms(100 * i));
+  for (int i = 1; i < 50; ++i) map.add(lost, rows_at_ms(100 * i));
   EXPECT_FALSE(map.points_m().empty());
 }
 
