@@ -4,6 +4,7 @@
 
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 
@@ -157,6 +158,10 @@ struct Trip {
 
 class PilotScanner : public testing::TestWithParam<const char*> {};
 
+bool nightly() {
+  return std::getenv("VANTAGE_NIGHTLY") != nullptr;
+}
+
 TEST_P(PilotScanner, DrivesAtFullSpeedWhereNothingIsInTheWay) {
   Trip trip(GetParam(), {});
   const mission::LegEnd leg = trip.drive();
@@ -183,6 +188,7 @@ TEST_P(PilotScanner, GoesRoundALowCrateThatItDoesNotSeeWhereItStops) {
 }
 
 TEST_P(PilotScanner, GivesUpWithAReasonWhereTheRoadIsBlocked) {
+  if (!nightly()) GTEST_SKIP() << "takes two minutes: set VANTAGE_NIGHTLY";
   Trip trip(GetParam(), {{{15, 0}, {15.5, 10}}});
   const mission::LegEnd leg = trip.drive();
   EXPECT_FALSE(leg.arrived);
@@ -214,6 +220,7 @@ TEST_P(PilotScanner, StandsStillWhileItsScannerIsSilent) {
 }
 
 TEST_P(PilotScanner, HoldsItsPlaceByTheWallsWhereNoSatellitesAreSeen) {
+  if (!nightly()) GTEST_SKIP() << "takes a minute: set VANTAGE_NIGHTLY";
   double blind_m = 0, worst_m = 0;
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     Trip trip(GetParam(), {}, {}, seed, false), blind(GetParam(), {}, {}, seed, false);

@@ -12,7 +12,7 @@ with_links() { # ROBOT FILE, LINKS FILE
 
 start_units() { # The mission of another folder than the yard, if given.
   local yard=${1:-$yard}
-  killall -q vantaged vantage-units || true # Of a check that failed.
+  kill $(pidof vantaged vantage-units) 2>/dev/null || true # Of a check that failed.
   mkdir -p $here
   /host/bin/vantage-units $yard/mission.toml --folder $here/ports --can vcan0 --threads 1 \
     >$here/links 2>/tmp/units.log </dev/null &
