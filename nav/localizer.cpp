@@ -107,7 +107,7 @@ Correction Localizer::add(const LocalizerEvent& event) {
   const bool latest = at == history_.end();  // The filter is that of the last entry already.
   if (!latest) filter_ = at == history_.begin() ? final_.front().after : std::prev(at)->after;
   Correction correction;
-  const bool gated = event.index() >= 2;
+  const bool gated = nav::gated(event);
   correction.gate = filter_.apply(config_, event);
   if (gated) {
     correction.nis = filter_.last_nis();

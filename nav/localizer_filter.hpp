@@ -6,6 +6,7 @@
 #include <array>
 #include <optional>
 
+#include "nav/hindsight.hpp"
 #include "nav/localizer_inputs.hpp"
 
 namespace nav {
@@ -33,6 +34,11 @@ struct LocalizerConfig {
   double gnss_wander_share = 0.5;
   double gnss_wander_s = 60.0;
   double gnss_velocity_floor_mps = 0.03;  // Wheels tell of the time between two reports.
+  // The error of a landmark's sighting lasts: seen again while it does, it tells that much less.
+  // 0: each sighting errs by itself.
+  double landmark_wander_s = 0;
+  // All beacons' ranges read long (or short) by the same share, which stays: 1 sigma.
+  double beacon_scale_sigma = 0;
   // What is measured is refused when its squared normalised innovation exceeds this (chi-square,
   // 99.9 %) for one, two and three numbers.
   double gate1_chi2 = 10.8;
@@ -82,7 +88,11 @@ class LocalizerFilter {
                   const Eigen::Matrix3d& covariance);
 
   // Events come in the order of their stamps.
-  Gate apply(const LocalizerConfig& config, const LocalizerEvent& event);
+  // tape: where to add what the event did to the errors.
+  Gate apply(const LocalizerConfig& config, const LocalizerEvent& event, ErrorTape* tape = nullptr);
+
+  // As it would be, had it known at that time what came later.
+  LocalizerFilter with(const Hindsight& later) const;
 
   hal::Pose2 pose() const;             // Heading in (-pi, pi].
   Eigen::Isometry3d T_W_B() const;     // With slope and height above the start.
@@ -93,6 +103,7 @@ class LocalizerFilter {
   bool standing() const { return still_s_ >= kStandingAfter_s; }
   double speed_mps() const { return speed_mps_; }
   double turn_radps() const { return turn_radps_; }
+  double beacon_scale() const { return beacon_scale_; }
   // Squared normalised innovation of the last gated measurement, and of how many numbers.
   double last_nis() const { return last_nis_; }
   int last_dimension() const { return last_dimension_; }
@@ -102,7 +113,8 @@ class LocalizerFilter {
 
  private:
   // Errors: position (W), attitude (turns about W's axes), gyro bias, slip of each side (share of
-  // its travel), and the wandering error of the fixes in units of its own sigma.
+  // its travel), the wandering error of the fixes in units of its own sigma, and by which share
+  // beacons' ranges read long.
   enum {
     kP = 0,
     kTheta = 3,
@@ -111,10 +123,12 @@ class LocalizerFilter {
     kSlipLeft = 9,
     kSlipRight,
     kWander,
-    kSize = 13
+    kBeaconScale = 13,
+    kSize
   };
-  using State = Eigen::Matrix<double, kSize, 1>;
-  using Matrix = Eigen::Matrix<double, kSize, kSize>;
+  static_assert(kSize == kErrors);
+  using State = Errors;
+  using Matrix = ErrorMatrix;
   template <int N>
   using Rows = Eigen::Matrix<double, N, kSize>;
 
@@ -143,6 +157,11 @@ class LocalizerFilter {
     double first_odometer_m{};
   };
 
+  struct Seen {
+    Eigen::Vector2d landmark_m{0, 0};
+    std::optional<hal::Time> last;
+  };
+
   // By how much refused poses in a row would move the pose: turned, then shifted.
   struct Move {
     double turn_rad{};
@@ -164,6 +183,7 @@ class LocalizerFilter {
             double by_wheels, double untold);
   void add_travel_noise(const LocalizerConfig& config, const hal::WheelTravel& travel,
                         double forward_m, const Eigen::Matrix3d& R_mid);
+  void forget(int error, double kept);
   void forget_slip(const LocalizerConfig& config, int side, double travel_m);
   void forget_tilt(const LocalizerConfig& config, double way_m);
   void level(const LocalizerConfig& config, const Turn& turn, double span_s, double accel_mps2);
@@ -179,15 +199,21 @@ class LocalizerFilter {
     Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1> innovation;
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3> R;
   };
-  Gate update(const LocalizerConfig& config, Source source, hal::Time stamp, const Measured& m);
+  // stale: the error that it has in common with what was measured before takes away from what it
+  // tells as if its covariance were so many times larger.
+  Gate update(const LocalizerConfig& config, Source source, hal::Time stamp, const Measured& m,
+              double stale = 1);
   void absorb(const Measured& m);
   void note(Source source, hal::Time stamp, bool refused);
+  double stale(const LocalizerConfig& config, const LandmarkSighting& sighting) const;
+  void remember(const LandmarkSighting& sighting);
 
   Eigen::Vector3d position_m_{0, 0, 0};
   Eigen::Matrix3d R_W_B_ = Eigen::Matrix3d::Identity();
   Eigen::Vector3d bias_radps_{0, 0, 0};
   Eigen::Vector2d slip_{0, 0};
   Eigen::Vector2d wander_{0, 0};
+  double beacon_scale_{};
   Matrix covariance_ = Matrix::Zero();
   Turn turn_;
   WheelTurn told_;  // Since the last inertial sample: the next one tells it again.
@@ -196,6 +222,8 @@ class LocalizerFilter {
   std::optional<hal::Time> imu_time_, travel_time_, fix_time_;
   std::optional<Agreeing> agreeing_;
   Move move_;
+  // The landmarks last seen; of more than these the one not seen for longest is forgotten.
+  std::array<Seen, 16> seen_{};
   std::array<RefusalStreak, kSources> refusals_{};
   double speed_mps_{}, turn_radps_{};  // Of the last travel report.
   Eigen::Vector2d side_speed_mps_{0, 0};
@@ -205,6 +233,7 @@ class LocalizerFilter {
   double still_s_{};
   double last_nis_{};
   int last_dimension_{};
+  ErrorTape* tape_{};  // Only while an event is applied.
 };
 
 }  // namespace nav

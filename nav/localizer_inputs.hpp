@@ -56,6 +56,12 @@ struct BeaconRange {
 using LocalizerEvent = std::variant<InertialSample, hal::WheelTravel, GnssPosition, GnssVelocity,
                                     PoseFix, LandmarkSighting, BeaconRange>;
 
+// Whether it is held against the filter and may be refused as an outlier.
+inline bool gated(const LocalizerEvent& event) {
+  return !std::holds_alternative<InertialSample>(event) &&
+         !std::holds_alternative<hal::WheelTravel>(event);
+}
+
 inline hal::Time stamp_of(const LocalizerEvent& event) {
   return std::visit([](const auto& one) { return one.stamp; }, event);
 }

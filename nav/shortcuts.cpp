@@ -6,7 +6,7 @@
 namespace nav {
 namespace {
 
-using Points = std::vector<Eigen::Vector2d>;
+using Corners = std::vector<Eigen::Vector2d>;
 
 constexpr int kPassesMax = 8;
 constexpr double kStepMinM = 0.25;
@@ -14,8 +14,8 @@ constexpr double kPointsMax = 2000;
 constexpr double kShortcutRoundingM = 1e-9;
 
 // The same line with a point at least every step_m.
-Points resample(const Points& points_m, double step_m) {
-  Points dense{points_m.front()};
+Corners resample(const Corners& points_m, double step_m) {
+  Corners dense{points_m.front()};
   for (std::size_t i = 1; i < points_m.size(); ++i) {
     const Eigen::Vector2d a = points_m[i - 1];
     const Eigen::Vector2d b = points_m[i];
@@ -28,15 +28,15 @@ Points resample(const Points& points_m, double step_m) {
 
 class Pass {
  public:
-  Pass(const Points& points_m, double comfort_m, const ClearanceOf& clearance_of)
+  Pass(const Corners& points_m, double comfort_m, const ClearanceOf& clearance_of)
       : points_m_(points_m), clearance_of_(clearance_of) {
     pieces_m_.reserve(points_m.size());
     for (std::size_t i = 0; i + 1 < points_m.size(); ++i)
       pieces_m_.push_back(clearance_of({points_m[i], points_m[i + 1]}, comfort_m));
   }
 
-  Points run() const {
-    Points kept{points_m_.front()};
+  Corners run() const {
+    Corners kept{points_m_.front()};
     for (std::size_t i = 0; i + 1 < points_m_.size();) {
       i = reach(i);
       kept.push_back(points_m_[i]);
@@ -68,16 +68,16 @@ class Pass {
     return clearance_of_({points_m_[from], points_m_[to]}, keep_m) >= keep_m - kShortcutRoundingM;
   }
 
-  const Points& points_m_;
+  const Corners& points_m_;
   const ClearanceOf& clearance_of_;
   std::vector<double> pieces_m_;
 };
 
-Points shortened(Points points_m, double comfort_m, const ClearanceOf& clearance_of) {
+Corners shortened(Corners points_m, double comfort_m, const ClearanceOf& clearance_of) {
   double length_m = polyline_length_m(points_m);
   for (int pass = 0; pass < kPassesMax; ++pass) {
-    const Points dense = resample(points_m, std::max(kStepMinM, length_m / kPointsMax));
-    Points shorter = Pass(dense, comfort_m, clearance_of).run();
+    const Corners dense = resample(points_m, std::max(kStepMinM, length_m / kPointsMax));
+    Corners shorter = Pass(dense, comfort_m, clearance_of).run();
     std::reverse(shorter.begin(), shorter.end());  // The next pass starts from the other end.
     const double shorter_m = polyline_length_m(shorter);
     const bool settled = pass % 2 == 1 && shorter_m > length_m * 0.9995;
@@ -94,7 +94,7 @@ Points shortened(Points points_m, double comfort_m, const ClearanceOf& clearance
 
 }  // namespace
 
-double polyline_length_m(const Points& points_m) {
+double polyline_length_m(const Corners& points_m) {
   double length_m = 0;
   for (std::size_t i = 1; i < points_m.size(); ++i)
     length_m += (points_m[i] - points_m[i - 1]).norm();
@@ -102,10 +102,10 @@ double polyline_length_m(const Points& points_m) {
 }
 
 // Both ways round, so that the way back is as long as the way there.
-Points take_shortcuts(const Points& points_m, double comfort_m, const ClearanceOf& clearance_of) {
+Corners take_shortcuts(const Corners& points_m, double comfort_m, const ClearanceOf& clearance_of) {
   if (points_m.size() < 3) return points_m;
-  Points forth = shortened(points_m, comfort_m, clearance_of);
-  Points back = shortened({points_m.rbegin(), points_m.rend()}, comfort_m, clearance_of);
+  Corners forth = shortened(points_m, comfort_m, clearance_of);
+  Corners back = shortened({points_m.rbegin(), points_m.rend()}, comfort_m, clearance_of);
   if (polyline_length_m(forth) <= polyline_length_m(back)) return forth;
   std::reverse(back.begin(), back.end());
   return back;

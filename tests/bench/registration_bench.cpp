@@ -110,7 +110,7 @@ void localizer_step(benchmark::State& state) {
   }
 }
 void localizer_step_by_matrix_product(benchmark::State& state) {
-  Eigen::Matrix<double, 13, 13> F = Eigen::Matrix<double, 13, 13>::Identity(), P = F;
+  nav::ErrorMatrix F = nav::ErrorMatrix::Identity(), P = F;
   for (auto _ : state) {
     benchmark::DoNotOptimize(F.data());
     P = (F * P * F.transpose()).eval();
