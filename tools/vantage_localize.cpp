@@ -9,6 +9,7 @@
 
 #include "hal/angles.hpp"
 #include "nav/localizer.hpp"
+#include "nav/smoother.hpp"
 #include "nav/start_finder.hpp"
 #include "tools/vantage_command.hpp"
 #include "tools/vantage_localize_logs.hpp"
@@ -26,7 +27,7 @@ struct LocalizeOptions {
   std::filesystem::path odometry, imu, gnss, out;
   std::vector<double> start, origin, antenna;
   double imu_offset_s = 0, gnss_offset_s = 0;
-  bool json = false;
+  bool json = false, smooth = false;
   nav::LocalizerConfig config;
 };
 
@@ -43,10 +44,11 @@ struct Outcome {
 // Follows one log after its start is known.
 class Follower {
  public:
-  Follower(const nav::LocalizerConfig& config, const logs::Clock& clock)
-      : config_(config), clock_(clock), finder_(config, {}) {}
+  Follower(const nav::LocalizerConfig& config, const logs::Clock& clock, bool smooth)
+      : config_(config), clock_(clock), finder_(config, {}), smooth_(smooth) {}
 
   void start(const hal::Pose2& pose, const Eigen::Matrix3d& covariance) {
+    start_ = {pose, covariance};
     localizer_.emplace(config_, pose, covariance);
   }
 
@@ -58,7 +60,10 @@ class Follower {
       outcome_.refused += correction.gate == nav::Gate::rejected;
       outcome_.resets += correction.gate == nav::Gate::reset;
     }
-    if (std::holds_alternative<hal::WheelTravel>(event)) write(nav::stamp_of(event));
+    if (smooth_)
+      followed_.push_back(event);
+    else if (std::holds_alternative<hal::WheelTravel>(event))
+      write(nav::stamp_of(event), localizer_->T_W_B());
   }
 
   Outcome take() {
@@ -66,6 +71,9 @@ class Follower {
       outcome_.waiting_for = finder_.waiting_for();
       return std::move(outcome_);
     }
+    if (smooth_)
+      for (const auto& pose : nav::smooth(config_, start_.pose, start_.covariance, followed_).poses)
+        write(pose.stamp, pose.T_W_B);
     outcome_.faults = localizer_->faults();
     outcome_.last = localizer_->pose();
     outcome_.sigma = localizer_->covariance().diagonal().cwiseSqrt();
@@ -82,8 +90,7 @@ class Follower {
     start(found->pose, found->covariance);
   }
 
-  void write(hal::Time stamp) {
-    const Eigen::Isometry3d T = localizer_->T_W_B();
+  void write(hal::Time stamp, const Eigen::Isometry3d& T) {
     const Eigen::Quaterniond q(T.linear());
     outcome_.tum +=
         fmt::format("{:.6f} {:.4f} {:.4f} {:.4f} {:.6f} {:.6f} {:.6f} {:.6f}\n",
@@ -95,7 +102,13 @@ class Follower {
   nav::LocalizerConfig config_;
   logs::Clock clock_;
   nav::StartFinder finder_;
+  bool smooth_;
+  struct {
+    hal::Pose2 pose;
+    Eigen::Matrix3d covariance;
+  } start_;
   std::optional<nav::Localizer> localizer_;
+  std::vector<nav::LocalizerEvent> followed_;  // Since the start, where they are smoothed.
   Outcome outcome_;
 };
 
@@ -147,7 +160,7 @@ int localize_command(LocalizeOptions options) {
     all.push_back(logs::read_gnss(options.gnss, options.gnss_offset_s, geo));
   logs::Clock clock;
   const auto events = logs::stamped(std::move(all), clock);
-  Follower follower(options.config, clock);
+  Follower follower(options.config, clock, options.smooth);
   if (!options.start.empty())
     follower.start(
         {{options.start[0], options.start[1]}, options.start[2] * kDeg},
@@ -178,6 +191,8 @@ void add_files(CLI::App& command, LocalizeOptions& options) {
       .add_option("--origin", options.origin,
                   "W's origin: latitude longitude (deg) height (m); default: the first fix")
       ->expected(3);
+  command.add_flag("--smooth", options.smooth,
+                   "Each pose also with what came after it, to the end of the logs");
 }
 
 }  // namespace

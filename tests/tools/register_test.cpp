@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <sstream>
@@ -133,6 +134,41 @@ TEST_F(LocalizeTest, FindsItsStartFromFixesWhileDriving) {
   const auto poses = trajectory("way.tum");
   ASSERT_GT(poses.size(), 500U);
   EXPECT_NEAR(std::hypot(poses.back().x, poses.back().y), 20, 0.05);
+}
+
+TEST_F(LocalizeTest, SmoothsAGapWithTheFixesAfterIt) {
+  // Wheels that turn too far to the left, and half a minute without fixes.
+  Logs logs = circle();
+  logs.odometry = "time_s,left_m,right_m\n";
+  for (int i = 1; i <= 1200; ++i)
+    logs.odometry += std::to_string(100 + i * 0.05) + ",0.04905,0.05075\n";
+  std::istringstream fixes(logs.gnss);
+  std::string seen;
+  for (std::string line; std::getline(fixes, line);)
+    if (line < "120" || line >= "150") seen += line + "\n";
+  const auto call = "localize --odometry " + write("o.csv", logs.odometry).string() + " --gnss " +
+                    write("g.csv", seen).string() + " --start 20 0 90 --out ";
+  const auto worst_m = [&](const std::string& name, const std::string& option) {
+    const auto outcome = run(call + (folder_.path() / name).string() + option);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    double worst = 0;
+    for (const auto& p : trajectory(name))
+      worst = std::max(worst, std::hypot(p.x - 20 * std::cos((p.t - 100) / 20),
+                                         p.y - 20 * std::sin((p.t - 100) / 20)));
+    return worst;
+  };
+  const double followed_m = worst_m("way.tum", ""), smoothed_m = worst_m("smooth.tum", " --smooth");
+  RecordProperty("followed_m", std::to_string(followed_m));
+  RecordProperty("smoothed_m", std::to_string(smoothed_m));
+  EXPECT_GT(followed_m, 1);
+  EXPECT_LT(smoothed_m, followed_m / 4);
+  const auto followed = trajectory("way.tum"), smoothed = trajectory("smooth.tum");
+  ASSERT_EQ(followed.size(), 1200U);
+  ASSERT_EQ(smoothed.size(), 1200U);
+  for (std::size_t i = 0; i < smoothed.size(); ++i) ASSERT_EQ(smoothed[i].t, followed[i].t) << i;
+  EXPECT_NEAR(smoothed.back().x, followed.back().x,
+              2e-3);  // But for a fix of its stamp nothing came.
+  EXPECT_NEAR(smoothed.back().y, followed.back().y, 2e-3);
 }
 
 TEST_F(LocalizeTest, SaysWhichColumnIsMissingAndThatThereIsNoStart) {
