@@ -34,8 +34,8 @@ struct SmoothedLog {
 };
 
 // Events in any order. covariance: of (x m, y m, heading rad) at the start, in W. Refused
-// measurements count as little as they do for the localizer. Needs about 20 bytes of memory an
-// event beside the poses.
+// measurements count as little as they do for the localizer. Needs some 50 bytes of memory an
+// event beside events and poses.
 SmoothedLog smooth(const LocalizerConfig& config, const hal::Pose2& start,
                    const Eigen::Matrix3d& covariance, std::span<const LocalizerEvent> events);
 
