@@ -1,4 +1,0 @@
-// The same for tests that run programs or whole missions: nothing to optimize in them.
-#pragma once
-
-#include "tools/pch/tests.hpp"
