@@ -196,6 +196,13 @@ struct RegisterConfig {
   bool tour_end = true;  // All pairs together when a tour closes; the map is filled anew.
 };
 
+// [disk]
+struct DiskConfig {
+  double patience_s = 300;      // That it may fail before the robot does what follows.
+  std::string then = "stands";  // "stands": the mission ends where it stands | "home"
+  bool home() const { return then == "home"; }
+};
+
 // Where a key was written. Line and column count from 1; 0 says "the whole file" (or no file).
 struct ConfigPlace {
   std::string file;
@@ -235,8 +242,9 @@ struct MissionConfig {
   Phase2Config phase2;
   LocalizeConfig localize;
   RegisterConfig registration;  // [register]
-  RobotConfig robot;            // Read from robot_file.
-  SavedPlan plan;               // Read from plan_file; without one Phase I is planned.
+  DiskConfig disk;
+  RobotConfig robot;  // Read from robot_file.
+  SavedPlan plan;     // Read from plan_file; without one Phase I is planned.
 
   // Where each value that is not a default came from, by the path of the member it set: "seed",
   // "robot" and "site" (the keys), "phase2.voxel_m", "regions.moat", "robot.scanner.range_max_m".

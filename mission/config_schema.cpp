@@ -168,6 +168,24 @@ SectionSpec register_section() {
           {}};
 }
 
+SectionSpec disk_section() {
+  using D = DiskConfig;
+  const Keys<D> keys{[](MissionConfig& c) -> D& { return c.disk; }};
+  return {ConfigFile::mission,
+          "disk",
+          "A disk that does not take what has to be kept: the robot stands, and goes on as soon as "
+          "it does.",
+          {keys.number("patience_s", &D::patience_s, 1, 540, "s",
+                       "That it may fail without a break; then the mission ends, and can be "
+                       "resumed"),
+           keys.other("then", &D::then,
+                      "Where it ends: where the robot stands, or at its start, to which it drives "
+                      "without the disk, also when that works again on the way",
+                      {"stands", "home"})},
+          {},
+          {}};
+}
+
 SectionSpec regions_section() {
   return {ConfigFile::mission,
           "regions",
@@ -534,12 +552,12 @@ std::string_view name(ConfigFile file) {
 
 const std::vector<SectionSpec>& config_schema() {
   static const std::vector<SectionSpec> schema{
-      mission_section(),  phase1_section(),  phase2_section(),      localize_section(),
-      register_section(), regions_section(), robot_section(),       body_section(),
-      drive_section(),    scanner_section(), pan_section(),         obstacles_section(),
-      imu_section(),      gnss_section(),    corrections_section(), power_section(),
-      console_section(),  battery_section(), sim_section(),         plan_section(),
-      station_section()};
+      mission_section(),   phase1_section(),  phase2_section(),  localize_section(),
+      register_section(),  disk_section(),    regions_section(), robot_section(),
+      body_section(),      drive_section(),   scanner_section(), pan_section(),
+      obstacles_section(), imu_section(),     gnss_section(),    corrections_section(),
+      power_section(),     console_section(), battery_section(), sim_section(),
+      plan_section(),      station_section()};
   return schema;
 }
 

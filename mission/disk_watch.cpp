@@ -26,4 +26,11 @@ std::string DiskWatch::text() const {
   return well() ? std::string() : fault_text(files_ ? *files_ : *journal_);
 }
 
+DiskWatch::Answer DiskWatch::answer(hal::Time now) const {
+  if (goes_home_) return Answer::goes_home;
+  if (well()) return Answer::goes_on;
+  if (!given_up(now)) return Answer::stands;
+  return then_home_ ? Answer::goes_home : Answer::ends;
+}
+
 }  // namespace mission

@@ -246,17 +246,26 @@ constexpr FaultEntry kFaultTable[] = {
      "the robot stands and the mission ends, with its reason", "see the reason; simplify the map"},
     {FaultCode::disk_full, "F700-disk-full", Action::hold,
      "too little space for the next scan, or for what is to be kept of this one",
-     "nothing counts before it is saved; the robot stands for up to 5 min until there is space",
+     "nothing counts before it is saved; the robot stands for up to 5 min (`[disk] patience_s`) "
+     "until "
+     "there is space",
      "free space; after 5 min the mission has ended: go on with it by `resume`"},
     {FaultCode::disk_failed, "F701-disk-failed", Action::hold, "the disk does not read or write",
-     "nothing counts before it is saved; the robot stands for up to 5 min until the disk works",
+     "nothing counts before it is saved; the robot stands for up to 5 min (`[disk] patience_s`) "
+     "until the "
+     "disk works",
      "check the disk; after 5 min the mission has ended: go on with it by `resume`"},
     {FaultCode::disk_read_only, "F702-disk-read-only", Action::hold, "the folder cannot be written",
-     "no mission is started; one that runs stands for up to 5 min until it can be",
+     "no mission is started; one that runs stands for up to 5 min (`[disk] patience_s`) until it "
+     "can be",
      "make it writable, or choose another folder"},
     {FaultCode::journal_damaged, "F703-journal-damaged", Action::hold,
      "the journal does not hold together", "no resume is offered",
      "start the mission anew; keep the journal for the maker"},
+    {FaultCode::disk_given_up, "F704-disk-given-up", Action::home,
+     "the disk failed for longer than `[disk] patience_s`, and `then = \"home\"`",
+     "the robot drives home without its disk, also when that works again; the mission ends there",
+     "check the disk, free space; go on with the mission by `resume`"},
     {FaultCode::program_fault, "F800-program-fault", Action::stop,
      "a mistake in this program: a promise of its code was broken",
      "the motors stop; it comes up again and waits", "report what it said; then release the robot"},

@@ -109,6 +109,7 @@ enum class FaultCode : std::uint8_t {
   disk_failed,
   disk_read_only,
   journal_damaged,
+  disk_given_up,
   program_fault,
   watchdog_restart,
   power_cut,

@@ -25,7 +25,7 @@ struct Options {
   int threads = 0;
   bool quiet = false;
   bool service = false;
-  bool resume = false, restart = false;
+  bool resume = false, restart = false, from_start = false;
   std::vector<std::string> skip;
 };
 
@@ -149,6 +149,7 @@ int run(const Options& options) {
   const mission::RunOptions run_options{.out = place.folder,
                                         .resume = place.resume,
                                         .skip = options.skip,
+                                        .from_start = options.from_start,
                                         .judge_cells = options.judge_cells,
                                         .threads = mission::threads_or_all(options.threads),
                                         .progress = options.quiet ? nullptr : &std::cerr,
@@ -181,6 +182,10 @@ void add_options(mission::CommandLine& line, Options& options) {
            {.excludes = "--resume"});
   line.add("--skip", &options.skip,
            "With --resume: leave out this station, by its name; may be given again",
+           {.needs = "--resume"});
+  line.add("--from-start", &options.from_start,
+           "With --resume: the robot stands at its start now, wherever the run last knew it to be, "
+           "as when it drove home for a disk that never worked again",
            {.needs = "--resume"});
   line.add("--quiet", &options.quiet, "No progress on the terminal");
   line.add("--service", &options.service,

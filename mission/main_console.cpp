@@ -28,10 +28,11 @@ double worse_sigma_m(const Eigen::Matrix3d& covariance) {
 }  // namespace
 
 std::vector<FaultNow> faults_now(const RobotDrivers& drivers, const LinkTroubles& link_troubles,
-                                 const GatedDrive& gate) {
+                                 const GatedDrive& gate, bool home_for_disk) {
   std::vector<FaultNow> faults;
   if (const auto by = gate.stopped_by()) add(faults, *by, "latched: it wants a release");
   if (const auto by = gate.held_by()) add(faults, *by, "");
+  if (home_for_disk) add(faults, FaultCode::disk_given_up, "");
   for (const NamedDevice& named : drivers.devices()) {
     if (link_troubles)
       for (const drivers::Trouble& trouble : link_troubles(named.role))
@@ -58,7 +59,8 @@ ConsoleFacts RobotConsole::facts() const {
   facts.orders = parts_.survey.orders().text();
   facts.pose = parts_.survey.pilot().pose();
   facts.sigma_m = worse_sigma_m(parts_.survey.pilot().covariance());
-  facts.faults = faults_now(parts_.drivers, parts_.link_troubles, gate);
+  facts.faults =
+      faults_now(parts_.drivers, parts_.link_troubles, gate, parts_.survey.goes_home_for_disk());
   return facts;
 }
 

@@ -46,7 +46,8 @@ class Service;
 struct RunOptions {
   std::filesystem::path out;           // Folder for the run's products.
   bool resume = false;                 // Go on with the unfinished run that is in it,
-  std::vector<std::string> skip = {};  // without these of its stations.
+  std::vector<std::string> skip = {};  // without these of its stations,
+  bool from_start = false;             // by a robot that stands at its start now.
   std::filesystem::path judge_cells;   // See SimBackend::judge.
   int threads = 1;
   std::ostream* progress = nullptr;              // Null: says nothing.

@@ -11,7 +11,7 @@ namespace mission {
 
 struct Surroundings {
   bool pose_uncertain = false;          // Worse than the mission's limit.
-  bool battery_reserve = false;         // What is left is for the way home.
+  bool battery_reserve = false;         // What is left is for the way home; or it must do so now.
   std::optional<FaultCode> hold_fault;  // One of a device whose action is Action::hold.
   // When the range source at work spoke last, or was set to work; nothing: none is at work.
   std::optional<hal::Time> range_at;

@@ -86,6 +86,8 @@ Survey::Survey(const MissionConfig& config, const nav::SiteMap& map, SiteTasks t
       parts_(parts),
       began_(parts.clock.now()),
       orders_(parts.clock),
+      disk_(hal::from_seconds(config.disk.patience_s),
+            config.disk.home() && tasks_.start_area >= 0),
       pilot_(config.robot, parts.clock, parts.devices, start_pose(tasks_, parts.past),
              start_covariance(parts.past)),
       model_(std::make_unique<SiteModel>(config, map, tasks_.tasks, threads)),
@@ -156,7 +158,7 @@ void Survey::note_end() {
                                             {"completed", record_.completed},
                                             {"reason", record_.end}});
   if (!decided) record_.notes.push_back("its end is no decision: " + decided.error().text());
-  keep_end();
+  uncount_last_scan(keep_end());
 }
 
 // What lives with the survey: the pilot keeps the pose, the journal is written, and the disk is
@@ -170,6 +172,15 @@ hal::Task<void> Survey::beside() {
 
 hal::Task<void> Survey::survey() {
   co_await plan_stations();
+  if (!config_.disk.home()) {
+    co_await survey_site();
+    co_return;
+  }
+  const int first = co_await hal::first_of(survey_site(), until_sent_home());
+  if (first != 0) co_await home_without_disk();
+}
+
+hal::Task<void> Survey::survey_site() {
   if (parts_.past != nullptr)
     co_await take_up();
   else
@@ -183,7 +194,7 @@ hal::Task<void> Survey::survey() {
     ordered_home = true;
   }
   if (ordered_home) co_await leave_for_home();
-  co_await go_home(ordered_home);
+  (void)co_await go_home(ordered_home);
   note_box();
   record_.completed = !ordered_home;
 }
@@ -468,10 +479,8 @@ hal::Task<bool> Survey::acquire(const Stop& stop, ScanRecord scan) {
   scan.number = static_cast<int>(record_.scans.size()) + 1;
   scan.start_s = now_s();
   co_await until_decided();
-  const std::function<void()> look_for_room = [this] {
-    parts_.store.has_room(kScansOfRoom * scan_bytes(config_.robot.scanner)).value();
-  };
-  co_await until_written(look_for_room);
+  const std::function<void()> look = [this] { look_for_room(); };
+  co_await until_written(look);
   const int takes = config_.registration.scans && config_.registration.retake ? 2 : 1;
   for (int take = 1;; ++take) {
     const double began_s = now_s();
@@ -499,9 +508,15 @@ hal::Task<bool> Survey::acquire(const Stop& stop, ScanRecord scan) {
     const std::function<void()> work = [&] { merge(*cloud, saved, stop, scan); };
     co_await parts_.compute.run(work);
     co_await keep_scan(stop);
+    keeps_scan_ = false;
     co_await know_walls();
     co_return true;
   }
+}
+
+// For the next scan. Throws FileFailure: there is none.
+void Survey::look_for_room() {
+  parts_.store.has_room(kScansOfRoom * scan_bytes(config_.robot.scanner)).value();
 }
 
 // A few tries. Nothing: the stop is dropped, with the reason. Throws when it must be expected that
@@ -574,6 +589,8 @@ void Survey::merge(const hal::ScanCloud& cloud, const Saved& saved, const Stop& 
           {"rough_ground_cells", effect.rough_ground_m.size()},
           {"box_layers_added", effect.layers_added}});
   record_.scans.push_back(std::move(scan));
+  keeps_scan_ = parts_.journal != nullptr;
+  told_scan_ = false;
 }
 
 void Survey::save_points(const ScanRecord& scan, const std::vector<Eigen::Vector3f>& W_points_m,
@@ -638,15 +655,16 @@ void Survey::show(const Stop& stop) {
   parts_.progress.show(progress);
 }
 
-// Ordered or not: on the way a person may still take over.
-hal::Task<void> Survey::go_home(bool ordered) {
-  if ((!config_.return_home && !ordered) || tasks_.start_area < 0) co_return;
+// Ordered or not: on the way a person may still take over. False: it is not there.
+hal::Task<bool> Survey::go_home(bool ordered) {
+  if ((!config_.return_home && !ordered) || tasks_.start_area < 0) co_return false;
   const Stop home{.name = "home",
                   .task = tasks_.start_area,
                   .pose = tasks_.start,
                   .station = nullptr,
                   .view = nullptr};
-  co_await visit(home);
+  const bool there = co_await visit(home);
+  co_return there;
 }
 
 }  // namespace mission

@@ -78,9 +78,12 @@ class Survey {
   const Pilot& pilot() const { return pilot_; }
   // For the gate; does not allocate.
   Surroundings surroundings();
-  // Why the disk does not take what has to be kept; the robot is to stand then. Nothing: it does.
-  // Does not allocate.
-  std::optional<FaultCode> disk_fault() const { return disk_.fault(); }
+  // Why the disk does not take what has to be kept; the robot is to stand then. Nothing: it does,
+  // or the robot goes home for it. Does not allocate.
+  std::optional<FaultCode> disk_fault() const {
+    return goes_home_for_disk() ? std::nullopt : disk_.fault();
+  }
+  bool goes_home_for_disk() const { return disk_.goes_home(); }
   const std::optional<Progress>& shown() const { return shown_; }  // The latest; nothing: none yet.
 
  private:
@@ -94,13 +97,14 @@ class Survey {
   };
 
   hal::Task<void> survey();
+  hal::Task<void> survey_site();
   hal::Task<void> look_around();
   hal::Task<void> beside();
   hal::Task<void> plan_stations();
   void take_plans(std::vector<PlannedArea> planned);
   hal::Task<void> tour(std::size_t task);
   hal::Task<void> refine();
-  hal::Task<void> go_home(bool ordered);
+  hal::Task<bool> go_home(bool ordered);
   std::string why_no_scan() const;
   // In survey_journal.cpp.
   hal::Task<void> keep(EventText event);
@@ -112,7 +116,7 @@ class Survey {
   void tell_drop(const Stop& stop);
   hal::Task<void> tell_places();
   hal::Task<void> follow(const Stop& stop, LegEnd& leg);
-  void keep_end();
+  bool keep_end();
   void note_end();
   RunPlanned planned() const;
   SoFar so_far() const;
@@ -121,8 +125,15 @@ class Survey {
   hal::Task<void> until_written(std::function<void()> work);
   hal::Task<void> until_decided();
   hal::Task<void> watch_disk();
+  void heed_disk();
   void note_disk(DiskWatch::Part part, const FileError* why);
   void say_disk(const std::string& what);
+  void look_for_room();
+  hal::Task<void> until_sent_home();
+  hal::Task<void> home_without_disk();
+  hal::Task<void> wait_at_home(std::string& why_not_there);
+  hal::Task<void> try_disk();
+  void uncount_last_scan(bool journal_is_whole);
   // In survey_resume.cpp.
   hal::Task<void> take_up();
   void redo();
@@ -230,6 +241,10 @@ class Survey {
   std::string stop_reason_;
   SurveyOrders orders_;
   DiskWatch disk_;
+  hal::Wake sent_home_;      // By the disk,
+  std::string disk_why_;     // for that reason.
+  bool keeps_scan_ = false;  // The last scan counts only when the journal has taken its event,
+  bool told_scan_ = false;   // which it was given.
   Pilot pilot_;
   std::unique_ptr<SiteModel> model_;
   std::unique_ptr<MapMatcher> matcher_;  // Null: not asked for.

@@ -76,6 +76,7 @@ hal::Task<void> Survey::keep_scan(const Stop& stop) {
   if (config_.registration.scans) done.registered = registrar_.last_kept();
   done.so_far = so_far();
   done.where = whereabouts();
+  told_scan_ = true;
   co_await keep(event_of(done));
 }
 
@@ -126,12 +127,13 @@ hal::Task<void> Survey::tell_places() {
   }
 }
 
-// Nothing runs beside it any more.
-void Survey::keep_end() {
-  if (parts_.journal == nullptr) return;
+// Nothing runs beside it any more. False: the journal lacks something.
+bool Survey::keep_end() {
+  if (parts_.journal == nullptr) return true;
   EventText event = event_of(RunEnded{record_.completed, record_.end});
   const auto kept = parts_.journal->append_now(std::move(event.kind), std::move(event.text));
   if (!kept) record_.notes.push_back("its end is not in the journal: " + kept.error().text());
+  return static_cast<bool>(kept);
 }
 
 bool Survey::keeps_beams() const {

@@ -95,6 +95,10 @@ hal::Task<void> Survey::wait_for_orders() {
 
 hal::Task<void> Survey::run_errand(const SurveyOrders::Order& errand) {
   const bool scans = errand.kind == SurveyOrders::Kind::scan;
+  if (scans && goes_home_for_disk()) {
+    tell("no scan is taken any more: the robot goes home for its disk");
+    co_return;
+  }
   const auto ordered = std::ranges::count_if(record_.scans, [](const ScanRecord& scan) {
     return scan.name.starts_with("ordered ");  // Also before a run was resumed.
   });

@@ -107,7 +107,7 @@ hal::Task<void> SurveyOrders::until_interrupted() {
 std::string SurveyOrders::text() const {
   if (!running_) return {};
   if (on_errand_) return "on an errand of the operator's";
-  if (goes_home_ || home_) return "sent home by the operator";
+  if (goes_home_ || home_) return home_why_;
   return waits_ ? "the mission waits for the operator's `resume`" : "";
 }
 
@@ -128,6 +128,12 @@ bool SurveyOrders::take_home() {
   if (!std::exchange(home_, false)) return false;
   goes_home_ = true;
   return true;
+}
+
+void SurveyOrders::goes_home(std::string why) {
+  goes_home_ = true;
+  home_ = scanning_ = on_errand_ = false;
+  home_why_ = std::move(why);
 }
 
 }  // namespace mission

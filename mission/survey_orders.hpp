@@ -44,6 +44,8 @@ class SurveyOrders {
   bool take_skip() { return std::exchange(skip_, false); }
   bool take_moved() { return std::exchange(moved_, false); }  // A person moved the robot.
   bool take_home();
+  // It goes home of itself, and nobody has to order that any more. A person may still take over.
+  void goes_home(std::string why);
   bool waits() const { return waits_; }
   // A pause lets a scan be finished.
   void scanning(bool scans) { scanning_ = scans; }
@@ -68,6 +70,7 @@ class SurveyOrders {
   bool running_ = false, has_robot_ = false;
   bool waits_ = false, skip_ = false, home_ = false, goes_home_ = false, moved_ = false;
   bool scanning_ = false, on_errand_ = false, interrupted_ = false;
+  std::string home_why_ = "sent home by the operator";
   std::optional<Order> errand_;
   std::vector<Order> given_;
 };

@@ -21,6 +21,10 @@ hal::Task<void> Survey::take_up() {
   const std::function<void()> work = [this] { redo(); };
   co_await parts_.compute.run(work);
   if (!past.planned) co_await keep_plan();
+  if (config_.disk.home() && !past.ended && past.where)
+    say_disk(
+        "the run's end was not written: the robot is taken to stand where the run last knew it to "
+        "be; if it went home for its disk, stop it and resume with --from-start");
   tour_the_rest();
   decide({{"t_s", now_s()},
           {"decision", "resumed"},

@@ -39,7 +39,7 @@ Surroundings Survey::surroundings() {
   const bool certain = sigma_m(covariance) <= config_.localize.sigma_max_m &&
                        std::sqrt(covariance(2, 2)) <= kHeadingSigmaMaxRad;
   is.pose_uncertain = !certain;
-  is.battery_reserve = battery_low_;
+  is.battery_reserve = battery_low_ || goes_home_for_disk();
   is.range_at = pilot_.range_at();
   const Eigen::Vector2d at_m = pilot_.pose().position_m;
   if (!zone_speed_mps_ || !((at_m - zone_at_m_).norm() <= kLookAgainM)) {

@@ -84,6 +84,29 @@ TEST(Computer, EndsByNameWhenItsDiskFailsAndGoesOnWhenItIsMended) {
     }
 }
 
+// Whether it works again on the way, at home, or never: it is at home at the end, and goes on from
+// there.
+TEST(Computer, GoesHomeWhenItsDiskFailsForTooLong) {
+  const dst::Outcome before = run(quiet());
+  for (const dst::DiskFault fault : {dst::DiskFault::full, dst::DiskFault::io_error})
+    for (const hal::Duration during : {hal::Duration(315s), hal::Duration(450s), dst::kForEver})
+      for (const hal::Duration from : {hal::Duration(20s), before.virtual_time / 2}) {
+        SCOPED_TRACE(testing::Message() << dst::name(fault) << " after " << hal::seconds(from)
+                                        << " for " << hal::seconds(during));
+        dst::Scenario scenario = quiet();
+        scenario.disk = dst::DiskTrouble{fault, from, during, true};
+        dst::Options options;
+        options.observe = true;
+        const dst::Outcome outcome = dst::run_mission(dst::make_quiet_yard(), scenario, options);
+        EXPECT_FALSE(outcome.violation) << dst::report(0, *outcome.violation);
+        EXPECT_TRUE(outcome.named.contains("F704-disk-given-up"))
+            << testing::PrintToString(outcome.named);
+        EXPECT_EQ(outcome.resumed, 1);
+        EXPECT_TRUE(outcome.completed) << outcome.end;
+        EXPECT_EQ(outcome.scans, before.scans);
+      }
+}
+
 TEST(Computer, KeepsEveryScanWhenItsPowerIsCutAnywhere) {
   const dst::Outcome before = run(quiet());
   for (int i = 1; i <= 8; ++i) {

@@ -127,6 +127,9 @@ overlap_min = 0.5
 rms_max_m = 0.125
 retake = false
 tour_end = false
+[disk]
+patience_s = 60
+then = "home"
 )",
                             R"(name = "rn"
 backend = "sim"
@@ -259,6 +262,8 @@ register.overlap_min=0.5
 register.rms_max_m=0.125
 register.retake=false
 register.tour_end=false
+disk.patience_s=60
+disk.then=home
 robot.name=rn
 robot.backend=sim
 robot.body.radius_m=0.25

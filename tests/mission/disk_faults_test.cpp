@@ -163,6 +163,192 @@ TEST(DiskFaults, AFullDiskEndsAMissionByName) {
   EXPECT_EQ(run(site, scans_kept(site.out()) > 0).failure, "");
 }
 
+// --- A disk that sends the robot home.
+
+void add_to_mission(const mission_test::SmallSite& site, const std::string& text) {
+  std::ofstream(site.folder() / "mission.toml", std::ios::app) << text;
+}
+
+const char* const kHome = "[disk]\npatience_s = 20\nthen = \"home\"\n";
+
+// The scans that the journal has: their names, and what was measured.
+std::vector<std::pair<std::string, std::uint64_t>> acknowledged_scans(const fs::path& folder) {
+  const fs::path path = folder / "journal.sqlite";
+  const auto file = mission::JournalFile::open(path).value();
+  const auto history = mission::read_history(file.read().value(), path).value();
+  std::vector<std::pair<std::string, std::uint64_t>> all;
+  for (const mission::ScanDone* scan : history.scans())
+    all.emplace_back(scan->scan.name, scan->beams_checksum);
+  return all;
+}
+
+struct Failing {
+  int from_write{};      // The disk fails from then on,
+  hal::Duration during;  // for so long.
+  int why = ENOSPC;
+};
+
+struct Driven {
+  mission::RunOutcome outcome;
+  double away_m{};    // From its start, truly, when the disk began to fail,
+  double at_end_m{};  // and at the end.
+  hal::Duration failed_until_end{};
+};
+
+Driven run_on(const mission_test::SmallSite& site, const Failing& failing) {
+  const Eigen::Vector2d start_m = site.prepared().tasks.start.position_m;
+  Driven driven;
+  int writes = 0;
+  hal::Time now{};
+  std::optional<hal::Time> since;
+  DiskTrace trace([&](DiskOp::Kind kind) {
+    if (kind != DiskOp::Kind::write && kind != DiskOp::Kind::sync) return 0;
+    writes += kind == DiskOp::Kind::write;
+    if (writes <= failing.from_write) return 0;
+    if (!since) {
+      since = now;
+      driven.away_m = driven.at_end_m;
+    }
+    return now - *since < failing.during ? failing.why : 0;
+  });
+  trace.record = false;
+  driven.outcome = site.run([&](mission::SimBackend& backend) {
+    now = backend.clock().now();
+    driven.at_end_m = (backend.truths().robot.position_m - start_m).norm();
+  });
+  if (since) driven.failed_until_end = now - *since;
+  return driven;
+}
+
+constexpr hal::Duration kForGood = std::chrono::hours(24);
+// The second scan is on the disk, and the journal does not take its event any more.
+constexpr int kBeforeItsEvent = 363;
+
+// From its start the run goes on with all that was acknowledged, and takes nothing of it again.
+void expect_resumes(const mission_test::SmallSite& site, const std::set<std::string>& wanted,
+                    bool from_start) {
+  const auto safe = acknowledged_scans(site.out());
+  ASSERT_EQ(scans_kept(site.out()), static_cast<int>(safe.size()));
+  mission::Prepared ready = site.prepared();
+  const Eigen::Vector2d start_m = ready.tasks.start.position_m;
+  std::optional<double> begins_m;  // From there.
+  const auto watch = [&](mission::SimBackend& backend) {
+    if (!begins_m) begins_m = (backend.truths().robot.position_m - start_m).norm();
+  };
+  const mission::RunOutcome outcome = mission::run_in_simulation(ready, {.out = site.out(),
+                                                                         .resume = true,
+                                                                         .from_start = from_start,
+                                                                         .judge_cells = {},
+                                                                         .watch = watch});
+  EXPECT_LT(begins_m.value_or(1e9), 0.5);
+  EXPECT_EQ(outcome.failure, "");
+  EXPECT_TRUE(outcome.record.completed);
+  EXPECT_EQ(names(outcome.record), wanted);
+  EXPECT_EQ(outcome.record.scans.size(), wanted.size()) << "none twice";
+  const auto all = acknowledged_scans(site.out());
+  ASSERT_GE(all.size(), safe.size());
+  EXPECT_TRUE(std::equal(safe.begin(), safe.end(), all.begin()));
+  for (const mission::ScanRecord& scan : outcome.record.scans)
+    EXPECT_LT((scan.truth->position_m - scan.believed.position_m).norm(), 0.3) << scan.name;
+}
+
+TEST(DiskFaults, ADiskThatFailsForGoodSendsTheRobotHome) {
+  const mission_test::SmallSite undisturbed;
+  const std::set<std::string> wanted = names(run(undisturbed).record);
+  int away = 0, with_scans = 0;
+  for (const int why : {ENOSPC, EIO})
+    for (const int from_write : {80, 250, kBeforeItsEvent, 450}) {
+      SCOPED_TRACE(testing::Message() << "write " << from_write << " fails with " << why);
+      const mission_test::SmallSite site;
+      add_to_mission(site, kHome);
+      const Driven driven = run_on(site, {from_write, kForGood, why});
+      const mission::RunRecord& record = driven.outcome.record;
+      EXPECT_FALSE(record.completed);
+      EXPECT_THAT(driven.outcome.failure,
+                  HasSubstr("F704-disk-given-up: for more than patience_s"));
+      EXPECT_THAT(record.end,
+                  testing::StartsWith("F704-disk-given-up: for more than patience_s = 20 s "));
+      EXPECT_THAT(record.end, HasSubstr(why == ENOSPC ? "F700-disk-full" : "F701-disk-failed"));
+      EXPECT_THAT(record.end, HasSubstr("went home and is at its start; the disk still fails"));
+      EXPECT_THAT(record.notes, testing::Contains(HasSubstr("the robot goes home")));
+      EXPECT_LT(driven.at_end_m, 0.5);
+      EXPECT_GT(driven.failed_until_end, std::chrono::seconds(40))
+          << "it waits at home as long again";
+      const auto safe = acknowledged_scans(site.out());
+      std::set<std::string> counted;
+      for (const auto& [name, checksum] : safe) counted.insert(name);
+      EXPECT_EQ(names(record), counted) << "what is not durable does not count";
+      if (from_write == kBeforeItsEvent) {
+        EXPECT_THAT(record.notes, testing::Contains(HasSubstr("is not counted: the journal")));
+      }
+      away += driven.away_m > 3;
+      if (safe.empty()) continue;
+      ++with_scans;
+      expect_resumes(site, wanted, true);
+    }
+  EXPECT_GT(away, 2);
+  EXPECT_GT(with_scans, 2);
+}
+
+TEST(DiskFaults, ARobotThatGoesHomeGoesOnDoingSoWhenTheDiskWorksAgain) {
+  const mission_test::SmallSite undisturbed;
+  const std::set<std::string> wanted = names(run(undisturbed).record);
+  constexpr int kWhileItIsSaved = 345;  // The second scan; its files fail.
+  // On the way, and while it waits at home.
+  for (const auto& [from_write, seconds] :
+       {std::pair(250, 21), std::pair(250, 60), std::pair(kWhileItIsSaved, 60)}) {
+    SCOPED_TRACE(testing::Message() << from_write << ", for " << seconds << " s");
+    const mission_test::SmallSite site;
+    add_to_mission(site, kHome);
+    const Driven driven = run_on(site, {from_write, std::chrono::seconds(seconds)});
+    const mission::RunRecord& record = driven.outcome.record;
+    EXPECT_FALSE(record.completed);
+    EXPECT_THAT(record.end, testing::StartsWith("F704-disk-given-up"));
+    EXPECT_EQ(record.end.find("journal.sqlite") == std::string::npos,
+              from_write == kWhileItIsSaved);
+    EXPECT_THAT(record.end,
+                HasSubstr("at its start; the disk works again, and the run can be resumed"));
+    EXPECT_THAT(record.notes, testing::Contains(HasSubstr("the robot goes home anyway")));
+    EXPECT_LT(driven.at_end_m, 0.5);
+    EXPECT_EQ(names(record).size(), acknowledged_scans(site.out()).size());
+    const fs::path path = site.out() / "journal.sqlite";
+    {
+      const auto history =
+          mission::read_history(mission::JournalFile::open(path).value().read().value(), path)
+              .value();
+      ASSERT_TRUE(history.ended);
+      EXPECT_THAT(history.ended->reason, testing::StartsWith("F704-disk-given-up"));
+    }
+    expect_resumes(site, wanted, false);
+  }
+}
+
+TEST(DiskFaults, AMissionGoesOnWhenTheDiskWorksAgainInTime) {
+  const mission_test::SmallSite undisturbed, site;
+  const std::set<std::string> wanted = names(run(undisturbed).record);
+  add_to_mission(site, kHome);
+  const Driven driven = run_on(site, {250, std::chrono::seconds(15)});
+  EXPECT_EQ(driven.outcome.failure, "");
+  EXPECT_TRUE(driven.outcome.record.completed);
+  EXPECT_EQ(names(driven.outcome.record), wanted);
+  EXPECT_THAT(driven.outcome.record.notes, testing::Contains(HasSubstr("the mission goes on")));
+  EXPECT_THAT(driven.outcome.record.notes, testing::Not(testing::Contains(HasSubstr("F704"))));
+}
+
+TEST(DiskFaults, WithoutOrdersTheRobotEndsWhereItStands) {
+  for (const auto& [text, least, most] :
+       {std::tuple("", 300, 303), std::tuple("[disk]\npatience_s = 20\n", 20, 23)}) {
+    SCOPED_TRACE(text);
+    const mission_test::SmallSite site;
+    add_to_mission(site, text);
+    const Driven driven = run_on(site, {250, kForGood});
+    EXPECT_THAT(driven.outcome.record.end, testing::StartsWith("F700-disk-full: cannot write"));
+    EXPECT_GT(driven.at_end_m, 3);
+    EXPECT_GE(driven.failed_until_end, std::chrono::seconds(least));
+    EXPECT_LE(driven.failed_until_end, std::chrono::seconds(most));
+  }
+}
+
 class AlmostFull final : public mission::FileCalls {
  public:
   std::int64_t bytes_free(const char*) override {

@@ -87,6 +87,32 @@ TEST(DiskWatch, GivesUpWhenPatienceIsOverAndNotWhenItWorksBetween) {
   EXPECT_TRUE(disk.given_up(hal::Time(1h) + DiskWatch::kPatience + 1ns));
 }
 
+TEST(DiskWatch, AnswersAsItIsTold) {
+  using Answer = DiskWatch::Answer;
+  for (const auto& [home, over] :
+       {std::pair(false, Answer::ends), std::pair(true, Answer::goes_home)}) {
+    DiskWatch disk(20s, home);
+    EXPECT_EQ(disk.answer(hal::Time(24h)), Answer::goes_on) << "nothing failed";
+    disk.failed(Part::files, kFull, hal::Time(10s));
+    EXPECT_EQ(disk.answer(hal::Time(10s)), Answer::stands);
+    EXPECT_EQ(disk.answer(hal::Time(30s)), Answer::stands);
+    EXPECT_EQ(disk.answer(hal::Time(30s + 1ns)), over);
+    disk.works(Part::files);
+    EXPECT_EQ(disk.answer(hal::Time(31s)), Answer::goes_on) << "it works again in time";
+  }
+}
+
+TEST(DiskWatch, GoesHomeWhateverBecomesOfTheDisk) {
+  DiskWatch disk(20s, true);
+  disk.failed(Part::journal, kBroken, hal::Time(10s));
+  EXPECT_FALSE(disk.goes_home());
+  disk.go_home();
+  disk.works(Part::journal);
+  EXPECT_TRUE(disk.well());
+  EXPECT_TRUE(disk.goes_home());
+  EXPECT_EQ(disk.answer(hal::Time(40s)), DiskWatch::Answer::goes_home);
+}
+
 // The gate asks in every cycle.
 TEST(DiskWatch, AllocatesNothingWhenAsked) {
   DiskWatch disk;

@@ -120,8 +120,12 @@ Run begin_run(const fs::path& folder) {
 }
 
 // As the program does it on a robot.
-Run take_up_run(const fs::path& folder) {
+Run take_up_run(const fs::path& folder, bool at_start) {
   mission::RunHistory history = history_in(folder);
+  if (at_start) {
+    history.where.reset();
+    history.left = false;
+  }
   const std::optional<int> lost = mission::verify_scans(history, folder).value();
   Run run{mission::RunStore::go_on(folder).value(),
           mission::JournalFile::open(folder / mission::RunStore::kJournalName).value(),
@@ -132,12 +136,19 @@ Run take_up_run(const fs::path& folder) {
   return run;
 }
 
+mission::Prepared prepared_for(const support::RandomYard& yard, const Scenario& scenario) {
+  mission::Prepared ready = prepared(yard);
+  if (scenario.disk && scenario.disk->sends_home) ready.config.disk.then = "home";
+  return ready;
+}
+
 // Where the robot stands, and in which folder its run is.
 struct Begin {
   hal::Pose2 stands;
   fs::path folder;
   bool after_cut = false;  // Of the power, or of a run that ended with its disk.
   bool goes_on = false;
+  bool at_start = false;             // And the person who goes on with it sees the robot there.
   fs::path flushed = {}, next = {};  // Where the disk's states after a cut are made.
 };
 
@@ -149,9 +160,9 @@ class Mission {
         options_(options),
         begin_(begin),
         disk_(begin.folder),
-        run_(begin.goes_on ? take_up_run(begin.folder) : begin_run(begin.folder)),
+        run_(begin.goes_on ? take_up_run(begin.folder, begin.at_start) : begin_run(begin.folder)),
         journal_(std::move(run_.journal), clock_, compute_),
-        prepared_(prepared(yard)),
+        prepared_(prepared_for(yard, scenario)),
         rig_(yard, clock_, begin.stands),
         survey_(prepared_, 1, config(begin),
                 {io_, clock_, rig_.drivers(), run_.store, progress_, compute_, &journal_,
@@ -331,6 +342,8 @@ hal::Task<void> Mission::observe() {
       outcome_.named.insert(std::string(mission::entry_of(*stopped).id));
     const auto held_by = survey_.gate().held_by();
     const bool holds = held_by && *held_by != mission::FaultCode::range_stale;
+    if (survey_.survey().goes_home_for_disk() && survey_.gate().mode() == mission::Mode::returning)
+      outcome_.named.insert(std::string(mission::entry_of(mission::FaultCode::disk_given_up).id));
     if (holds) outcome_.named.insert(std::string(mission::entry_of(*held_by).id));
     outcome_.held |=
         holds || survey_.gate().mode() == mission::Mode::stopped || !survey_.watch().well();
@@ -416,10 +429,7 @@ struct Left {
 };
 
 // Scans that count, and would be gone with the power.
-std::optional<Violation> not_durable(const Disk& disk, const fs::path& flushed,
-                                     const Outcome& outcome) {
-  disk.copy_flushed(flushed);
-  const std::size_t safe = scans_in(flushed).size();
+std::optional<Violation> not_durable(std::size_t safe, const Outcome& outcome) {
   if (safe == outcome.scans) return std::nullopt;
   return Violation{hal::Time(outcome.virtual_time), "no scan counts that is not durable",
                    fmt::format("{} count, {} are flushed", outcome.scans, safe)};
@@ -433,8 +443,10 @@ Left run_leg(const support::RandomYard& yard, const Scenario& scenario, const Op
     mission.disk().copy_flushed(begin.flushed);
     mission.disk().copy(begin.next);
   }
-  if (outcome.completed && scenario.disk && !outcome.violation)
-    outcome.violation = not_durable(mission.disk(), begin.flushed, outcome);
+  if (outcome.completed && scenario.disk && !outcome.violation) {
+    mission.disk().copy_flushed(begin.flushed);
+    outcome.violation = not_durable(scans_in(begin.flushed).size(), outcome);
+  }
   return {outcome, mission.stands()};
 }
 
@@ -481,6 +493,9 @@ void go_on(const support::RandomYard& yard, const Scenario& scenario, const Opti
                          fmt::format("{} of {} are there", there.size(), safe.size())};
     return;
   }
+  if (left.outcome.end.starts_with("F704"))  // Until its end it knew what was saved.
+    outcome.violation = not_durable(safe.size(), left.outcome);
+  if (outcome.violation) return;
   Scenario well;
   well.seed = scenario.seed;
   well.releases_after = scenario.releases_after;
@@ -491,6 +506,7 @@ void go_on(const support::RandomYard& yard, const Scenario& scenario, const Opti
                     there.empty() ? again(before.folder) : before.next,
                     true,
                     !there.empty(),
+                    left.outcome.end.find("is at its start") != std::string::npos,
                     again(before.flushed),
                     again(before.next)};
   const Left second = run_leg(yard, well, options, begin);

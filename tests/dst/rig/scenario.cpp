@@ -98,7 +98,8 @@ void draw_computer(Dice& dice, Scenario& scenario) {
   }
   if (dice.below(6) == 0)
     scenario.disk =
-        DiskTrouble{static_cast<DiskFault>(dice.below(4)), draw_time(dice), draw_during(dice)};
+        DiskTrouble{static_cast<DiskFault>(dice.below(4)), draw_time(dice), draw_during(dice),
+                    scenario.seed % 2 == 1};  // Without a throw: older seeds stay what they are.
   if (dice.below(3) == 0) scenario.power_cut = PowerCut{draw_time(dice), dice.below(200)};
   if (scenario.power_cut && dice.below(2) == 0)
     scenario.cut_again = PowerCut{hal::from_seconds(dice.uniform(0, 90)), dice.below(200)};
@@ -188,7 +189,9 @@ std::string text(const Scenario& scenario) {
     lines.emplace(jump.from, fmt::format("  {:8.3f} s  the computer's clock jumps by {} s\n",
                                          hal::seconds(jump.from), jump.by.count()));
   if (const auto& disk = scenario.disk)
-    add(disk->from, disk->during, "the disk " + std::string(name(disk->fault)));
+    add(disk->from, disk->during,
+        "the disk " + std::string(name(disk->fault)) +
+            (disk->sends_home ? ", which sends the robot home" : ""));
   if (const auto& cut = scenario.power_cut)
     lines.emplace(cut->from, fmt::format("  {:8.3f} s  and {} steps: the power is cut\n",
                                          hal::seconds(cut->from), cut->steps));

@@ -58,6 +58,7 @@ std::string_view name(DiskFault fault);
 struct DiskTrouble {
   DiskFault fault{};
   hal::Duration from{}, during{};
+  bool sends_home = false;  // [disk] then = "home"
 };
 
 // The computer loses its power, so many steps of the simulation after that time; it comes back, and
