@@ -246,18 +246,15 @@ constexpr FaultEntry kFaultTable[] = {
      "the robot stands and the mission ends, with its reason", "see the reason; simplify the map"},
     {FaultCode::disk_full, "F700-disk-full", Action::hold,
      "too little space for the next scan, or for what is to be kept of this one",
-     "nothing counts before it is saved; the robot stands for up to 5 min (`[disk] patience_s`) "
-     "until "
-     "there is space",
-     "free space; after 5 min the mission has ended: go on with it by `resume`"},
+     "nothing counts before it is saved; the robot stands until there is space, for "
+     "`[disk] patience_s` at most",
+     "free space; if the mission has ended meanwhile, go on with it by `resume`"},
     {FaultCode::disk_failed, "F701-disk-failed", Action::hold, "the disk does not read or write",
-     "nothing counts before it is saved; the robot stands for up to 5 min (`[disk] patience_s`) "
-     "until the "
-     "disk works",
-     "check the disk; after 5 min the mission has ended: go on with it by `resume`"},
+     "nothing counts before it is saved; the robot stands until the disk works, for "
+     "`[disk] patience_s` at most",
+     "check the disk; if the mission has ended meanwhile, go on with it by `resume`"},
     {FaultCode::disk_read_only, "F702-disk-read-only", Action::hold, "the folder cannot be written",
-     "no mission is started; one that runs stands for up to 5 min (`[disk] patience_s`) until it "
-     "can be",
+     "no mission is started; one that runs stands until it can be, for `[disk] patience_s` at most",
      "make it writable, or choose another folder"},
     {FaultCode::journal_damaged, "F703-journal-damaged", Action::hold,
      "the journal does not hold together", "no resume is offered",

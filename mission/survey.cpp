@@ -658,6 +658,7 @@ void Survey::show(const Stop& stop) {
 // Ordered or not: on the way a person may still take over. False: it is not there.
 hal::Task<bool> Survey::go_home(bool ordered) {
   if ((!config_.return_home && !ordered) || tasks_.start_area < 0) co_return false;
+  if (!ordered) orders_.goes_home("on its way home at the mission's end");
   const Stop home{.name = "home",
                   .task = tasks_.start_area,
                   .pose = tasks_.start,

@@ -259,6 +259,17 @@ TEST(ConsoleMission, GoesHome) {
   EXPECT_LT((mission.where().position_m - mission.start().position_m).norm(), 0.5);
 }
 
+TEST(ConsoleMission, ThatIsOnItsWayHomeNeedsNobodyToSendIt) {
+  Mission mission;
+  ASSERT_TRUE(mission.run_until([&] { return !mission.record().end.empty(); }));
+  const std::string end = mission.record().end;
+  EXPECT_THAT(mission.ask("home\r"), HasSubstr("on its way home"));
+  ASSERT_TRUE(mission.run_to_the_end());
+  EXPECT_EQ(mission.record().end, end);
+  EXPECT_TRUE(mission.record().completed) << mission.failure();
+  EXPECT_LT((mission.where().position_m - mission.start().position_m).norm(), 0.5);
+}
+
 TEST(ConsoleMission, RunsErrandsAndGoesOn) {
   Mission mission;
   ASSERT_TRUE(mission.run_until_driven(1));
