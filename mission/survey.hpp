@@ -128,7 +128,6 @@ class Survey {
   void heed_disk();
   void note_disk(DiskWatch::Part part, const FileError* why);
   void say_disk(const std::string& what);
-  void look_for_room();
   hal::Task<void> until_sent_home();
   hal::Task<void> home_without_disk();
   hal::Task<void> wait_at_home(std::string& why_not_there);
@@ -180,7 +179,9 @@ class Survey {
   hal::Task<bool> visit_now(const Stop& stop);
   hal::Task<bool> drive(const Stop& stop, ScanRecord& scan);
   hal::Task<bool> carry(const Stop& stop, ScanRecord& scan);
+  // In survey_scan.cpp.
   hal::Task<bool> acquire(const Stop& stop, ScanRecord scan);
+  void look_for_room();
   hal::Task<std::optional<hal::ScanCloud>> take_scan(const Stop& stop);
   // What is on the disk of a scan.
   struct Saved {
@@ -193,8 +194,9 @@ class Survey {
                    const Eigen::Isometry3d& T_W_S);
   ScanEffect insert(const hal::ScanCloud& cloud, const std::vector<Eigen::Vector3f>& W_points_m,
                     const Eigen::Isometry3d& T_W_S, const Stop& stop, ScanRecord& scan);
+  void close_roads(int scan, const ScanEffect& effect);
 
-  // survey_register.cpp
+  // In survey_register.cpp.
   ScanBelief note_pose(ScanRecord& scan) const;
   enum class MapSays { nothing, here, elsewhere };  // Of where a scan was taken.
   hal::Task<MapSays> match_map(const hal::ScanCloud& cloud, const ScanRecord& scan);
@@ -225,7 +227,6 @@ class Survey {
   hal::Task<void> leave(std::string reason, bool stopped_for_gain);
   void note_leftover(bool stopped_for_gain);
   void drop(const Stop& stop, const std::string& reason);
-  void close_roads(int scan, const ScanEffect& effect);
   void decide(const boost::json::object& decision);
   void show(const Stop& stop);
   double now_s() const { return before_s_ + hal::seconds(parts_.clock.now() - began_); }
