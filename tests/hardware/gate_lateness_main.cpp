@@ -1,6 +1,8 @@
 // gate_lateness: how late the gate wakes up on this machine while plans are made on all of its
 // processors.
 #include <fmt/format.h>
+#include <pthread.h>
+#include <sched.h>
 
 #include <algorithm>
 #include <atomic>
@@ -16,6 +18,7 @@
 #include "mission/main_command_line.hpp"
 #include "mission/main_realtime.hpp"
 #include "mission/main_run.hpp"
+#include "tests/hardware/away.hpp"
 
 namespace {
 
@@ -23,6 +26,8 @@ using namespace std::chrono_literals;
 
 constexpr int kInTime = 0, kLate = 1, kRefused = 2;
 constexpr hal::Duration kSettles = 500ms;  // Before it counts.
+constexpr hal::Duration kLooks = 1ms, kGap = 3ms;
+constexpr std::size_t kGapsMax = 100'000;  // Of a processor.
 
 struct Options {
   std::filesystem::path mission;
@@ -33,8 +38,10 @@ struct Options {
 struct Lateness {
   // What the machine refused; empty: the gate runs before everything else, as in a service.
   std::string refusal;
-  std::vector<hal::Duration> late;  // Of each cycle, sorted.
+  std::vector<hal::Duration> late;  // Of each cycle, sorted, without what the machine took.
   int plans{};                      // That were finished meanwhile.
+  std::size_t gaps{};               // How often the machine took a processor away,
+  hal::Duration longest_gap{};      // and for how long at most.
 
   // So late, or less, was that share of all cycles.
   hal::Duration share(double share) const {
@@ -69,21 +76,63 @@ class WillingDrive final : public hal::GuardedDrive {
   hal::Clock& clock_;
 };
 
+// Sees on each processor, before everything else there, when the machine takes it away.
+class Sentinels {
+ public:
+  Sentinels() : gaps_(std::thread::hardware_concurrency()) {
+    for (std::size_t cpu = 0; cpu < gaps_.size(); ++cpu)
+      threads_.emplace_back([this, cpu](std::stop_token over) { watch(over, cpu); });
+  }
+  // Of each processor.
+  std::vector<std::vector<test::Away>> finish() {
+    threads_.clear();
+    return std::move(gaps_);
+  }
+
+ private:
+  void watch(const std::stop_token& over, std::size_t cpu) {
+    cpu_set_t here;
+    CPU_ZERO(&here);
+    CPU_SET(cpu, &here);
+    const sched_param first{.sched_priority = sched_get_priority_max(SCHED_FIFO)};
+    if (pthread_setaffinity_np(pthread_self(), sizeof here, &here) != 0 ||
+        pthread_setschedparam(pthread_self(), SCHED_FIFO, &first) != 0)
+      return;  // Then nothing is excused.
+    const drivers::RealClock clock;
+    gaps_[cpu].reserve(kGapsMax);
+    for (hal::Time last = clock.now(); !over.stop_requested();) {
+      std::this_thread::sleep_for(kLooks);
+      const hal::Time now = clock.now();
+      if (now - last > kGap && gaps_[cpu].size() < kGapsMax) gaps_[cpu].push_back({last, now});
+      last = now;
+    }
+  }
+
+  std::vector<std::vector<test::Away>> gaps_;
+  std::vector<std::jthread> threads_;
+};
+
+struct Cycle {
+  hal::Time due, came;
+  std::size_t cpu{};
+};
+
 // Its cycles, each against when it was due: a period after the one before.
-void run_gate(hal::Duration during, Lateness& found) {
+void run_gate(hal::Duration during, std::vector<Cycle>& cycles, std::string& refused) {
   for (const std::string& refusal : {mission::lock_memory(), mission::run_first()})
-    if (!refusal.empty()) found.refusal += (found.refusal.empty() ? "" : "; ") + refusal;
+    if (!refusal.empty()) refused += (refused.empty() ? "" : "; ") + refusal;
   boost::asio::io_context io{1};
   drivers::RealClock clock;
   WillingDrive drive(clock);
   const hal::Time from = clock.now() + kSettles, until = from + during;
-  found.late.reserve(static_cast<std::size_t>(during / mission::kGatePeriod) + 10);
+  cycles.reserve(static_cast<std::size_t>(during / mission::kGatePeriod) + 10);
   hal::Time due{};
   mission::GatedDrive::Config config;
   config.alive = [&] {
     const hal::Time now = clock.now();
     if (due == hal::Time{} || now < due) due = now;  // It was due no later than it came.
-    if (now >= from && found.late.size() < found.late.capacity()) found.late.push_back(now - due);
+    if (now >= from && cycles.size() < cycles.capacity())
+      cycles.push_back({due, now, static_cast<std::size_t>(sched_getcpu())});
     due = std::max(due + mission::kGatePeriod, now);
     if (now >= until) io.stop();
   };
@@ -105,11 +154,23 @@ Lateness measure(const Options& options, const mission::Prepared& prepared) {
       for (; !over; ++plans)
         (void)mission::plan_areas(prepared.config, prepared.site.map, prepared.tasks, 1);
     });
-  std::thread([&] { run_gate(std::chrono::seconds(options.seconds), found); }).join();
+  Sentinels sentinels;
+  std::vector<Cycle> cycles;
+  std::thread([&] {
+    run_gate(std::chrono::seconds(options.seconds), cycles, found.refusal);
+  }).join();
+  const std::vector<std::vector<test::Away>> away = sentinels.finish();
   over = true;
   planners.clear();
   found.plans = plans;
+  for (const Cycle& cycle : cycles)
+    found.late.push_back(test::own_lateness(cycle.due, cycle.came, away.at(cycle.cpu)));
   std::ranges::sort(found.late);
+  for (const std::vector<test::Away>& gaps : away)
+    for (const test::Away& gap : gaps) {
+      ++found.gaps;
+      found.longest_gap = std::max(found.longest_gap, gap.until - gap.from);
+    }
   return found;
 }
 
@@ -123,6 +184,9 @@ int run(const Options& options) {
       "{} cycles beside {} threads, which made {} plans\n",
       ms(found.share(0.5)), ms(found.share(0.99)), ms(found.share(0.999)), ms(found.share(1)),
       found.late.size(), options.planners, found.plans);
+  if (found.gaps > 0)
+    fmt::print("not counted: the machine took a processor away {} times, for {:.3f} ms at most\n",
+               found.gaps, ms(found.longest_gap));
   if (!found.refusal.empty()) {
     fmt::print("nothing is asked of it here: {}\n", found.refusal);
     return kInTime;
