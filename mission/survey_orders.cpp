@@ -107,8 +107,8 @@ hal::Task<void> SurveyOrders::until_interrupted() {
 std::string SurveyOrders::text() const {
   if (!running_) return {};
   if (on_errand_) return "on an errand of the operator's";
-  if (goes_home_ || home_) return home_why_;
-  return waits_ ? "the mission waits for the operator's `resume`" : "";
+  if (waits_) return "the mission waits for the operator's `resume`";
+  return goes_home_ || home_ ? home_why_ : "";
 }
 
 void SurveyOrders::tell(const std::string& what) const {

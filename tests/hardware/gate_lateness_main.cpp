@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <pthread.h>
 #include <sched.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -79,7 +80,8 @@ class WillingDrive final : public hal::GuardedDrive {
 // Sees on each processor, before everything else there, when the machine takes it away.
 class Sentinels {
  public:
-  Sentinels() : gaps_(std::thread::hardware_concurrency()) {
+  // Of all that there are, also where this program may not use them all: they go by their numbers.
+  Sentinels() : gaps_(static_cast<std::size_t>(sysconf(_SC_NPROCESSORS_CONF))) {
     for (std::size_t cpu = 0; cpu < gaps_.size(); ++cpu)
       threads_.emplace_back([this, cpu](std::stop_token over) { watch(over, cpu); });
   }

@@ -264,6 +264,10 @@ TEST(ConsoleMission, ThatIsOnItsWayHomeNeedsNobodyToSendIt) {
   ASSERT_TRUE(mission.run_until([&] { return !mission.record().end.empty(); }));
   const std::string end = mission.record().end;
   EXPECT_THAT(mission.ask("home\r"), HasSubstr("on its way home"));
+  EXPECT_THAT(mission.ask("status\r"), HasSubstr("on its way home"));
+  mission.ask("pause\r");
+  EXPECT_THAT(mission.ask("status\r"), HasSubstr("waits for the operator"));
+  mission.ask("resume\r");
   ASSERT_TRUE(mission.run_to_the_end());
   EXPECT_EQ(mission.record().end, end);
   EXPECT_TRUE(mission.record().completed) << mission.failure();
