@@ -100,10 +100,7 @@ OpenedRun go_on(const std::vector<RunInput>& inputs, const RunOptions& options) 
   RunStore store = RunStore::go_on(options.out).value();
   write_event(journal, event_of(RunResumed{history.why_ended(), lost}));
   ++history.resumed;
-  if (options.from_start) {
-    history.where.reset();
-    history.left = false;
-  }
+  if (options.from_start) history.stands_at_start();
   return {std::move(store), std::move(journal), std::move(history)};
 }
 

@@ -367,6 +367,11 @@ std::vector<const ScanDone*> RunHistory::scans() const {
   return all;
 }
 
+void RunHistory::stands_at_start() {
+  where.reset();
+  left = false;
+}
+
 // Tours that closed over it have to close again; legs and drops stay as they were.
 void RunHistory::lose_last_scan() {
   const int last = static_cast<int>(scans().size());

@@ -134,6 +134,8 @@ struct RunHistory {
   std::vector<const ScanDone*> scans() const;
   // Drops the last scan, and what rests on it.
   void lose_last_scan();
+  // A person saw the robot at its start, wherever it was last known.
+  void stands_at_start();
   bool finished() const { return ended && ended->completed && products; }
   // "the program was cut off" or the reason that it gave.
   std::string why_ended() const;

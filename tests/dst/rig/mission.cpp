@@ -122,10 +122,7 @@ Run begin_run(const fs::path& folder) {
 // As the program does it on a robot.
 Run take_up_run(const fs::path& folder, bool at_start) {
   mission::RunHistory history = history_in(folder);
-  if (at_start) {
-    history.where.reset();
-    history.left = false;
-  }
+  if (at_start) history.stands_at_start();
   const std::optional<int> lost = mission::verify_scans(history, folder).value();
   Run run{mission::RunStore::go_on(folder).value(),
           mission::JournalFile::open(folder / mission::RunStore::kJournalName).value(),
