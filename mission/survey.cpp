@@ -287,7 +287,6 @@ hal::Task<void> Survey::tour(std::size_t t) {
   for (std::size_t& at = dealt_with_[t]; at < plan.tour.size();) {
     const int s = plan.tour[at];
     const planning::Station& station = plan.cover.stations[static_cast<std::size_t>(s)];
-    // Named: GCC 12 destroys an aggregate made inside a co_await expression twice.
     const Stop stop{.name = station_name(plan, s),
                     .task = static_cast<int>(t),
                     .pose = pose_of(station.at),

@@ -88,7 +88,6 @@ TEST_P(Carmen, ScanMatchingKeepsTheRobotLocalizedThroughout) {
   match_config.map_sigma_rad = 0.01;
   std::optional<nav::Localizer> localizer;
   hal::Pose2 odometry, reckoned;
-  double way_m = 0, turn_rad = 0;
   // The lines are in the order in which it happened, their stamps are not always.
   double latest_s = 0;
   Score score, reckoning;
@@ -115,8 +114,6 @@ TEST_P(Carmen, ScanMatchingKeepsTheRobotLocalizedThroughout) {
         latest_s = std::max(latest_s + 1e-6, stamp_s);
         localizer->add(travel_of(at(latest_s, 0), along, turn, config.track_m));
         step_by(reckoned, along, turn);
-        way_m += std::abs(along);
-        turn_rad += std::abs(turn);
       }
       odometry = next;
     }

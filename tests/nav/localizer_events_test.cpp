@@ -319,7 +319,7 @@ TEST(LocalizerEvents, AnAccelerometerShowsTheSlopeAndTheSlopeShortensTheWay) {
     }
   };
   run(60, 0);
-  const auto start = localizer.T_W_B().translation();
+  const Eigen::Vector3d start = localizer.T_W_B().translation();
   run(20, 0.05);
   const Eigen::Vector3d way = localizer.T_W_B().translation() - start;
   EXPECT_NEAR(std::asin(localizer.T_W_B().linear()(2, 0)), slope, 0.3 * kDeg);

@@ -127,7 +127,7 @@ void add_ranges(BendyDrive& drive, support::Dice& dice) {
 TEST(Smoother, BeaconsThatReadLongAreSeenThroughAndLaterRangesCountForEarlierPoses) {
   support::Dice dice(5);
   Claims claims;
-  constexpr int kRuns = 60;
+  constexpr int kRuns = 150;
   for (int run = 0; run < kRuns; ++run) {
     BendyDrive drive = bendy_drive(dice, 1500);
     drive.config.beacon_scale_sigma = 0.1;

@@ -231,8 +231,8 @@ TEST_P(WrongWiring, IsNamedWithItsRemedy) {
 
 INSTANTIATE_TEST_SUITE_P(
     Doctor, WrongWiring,
-    testing::Values(Wrong{"BaudOfThePanUnit", "pan", "pan", "link", "@19200",
-                          "no pan-tilt unit's answers", "set the serial line to 9600 baud"},
+    testing::Values(Wrong{"BaudOfThePanUnit", "pan", "pan", "link", "@19200", "no answer",
+                          "on a serial line at 9600 baud"},
                     Wrong{"BaudOfTheImu", "imu", "imu", "link", "@57600", "not understood",
                           "set the bit rate of the robot file"},
                     Wrong{"BaudOfTheReceiver", "gnss", "gnss", "link", "@4800", "not understood",

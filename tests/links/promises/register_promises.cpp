@@ -55,7 +55,7 @@ hal::Result<void> TableUnit::write_coil_raw(std::uint16_t at, std::uint16_t valu
 
 namespace {
 
-// GCC 12 cannot have initializer lists in coroutines.
+// As a unit gives them.
 template <class... Values>
 std::vector<std::uint16_t> words(Values... values) {
   return {static_cast<std::uint16_t>(values)...};

@@ -1,0 +1,4 @@
+// What tests with a slow and obviously right version read.
+#pragma once
+
+#include "tools/pch/tests.hpp"
