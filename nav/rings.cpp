@@ -46,7 +46,7 @@ void add_contacts(const std::vector<SegmentMm>& edges, int i, int j, std::vector
     found.push_back({first, second, crossing_point(s, t), true});
     return;
   }
-  const auto touch = [&, first = first, second = second](int at, const SegmentMm& edge, PointMm p) {
+  const auto touch = [&, first, second](int at, const SegmentMm& edge, PointMm p) {
     if (at == 0 && inside_edge(edge, p)) found.push_back({first, second, p, false});
   };
   touch(ta, s, t.a);
@@ -152,7 +152,7 @@ bool cut_at_contacts(std::vector<Edge>& edges, std::vector<bool>& bent) {
   bent.clear();
   for (std::size_t i = 0; i < edges.size(); ++i) {
     const auto [a, b] = edges[i].line;
-    std::sort(cuts[i].begin(), cuts[i].end(), [a = a, b = b](PointMm p, PointMm q) {
+    std::sort(cuts[i].begin(), cuts[i].end(), [a, b](PointMm p, PointMm q) {
       return std::pair(dot(p - a, b - a), p) < std::pair(dot(q - a, b - a), q);
     });
     cuts[i].push_back(b);

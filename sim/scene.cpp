@@ -144,13 +144,13 @@ std::optional<Hit> Scene::cast(const Eigen::Vector3d& W_from, const Eigen::Vecto
 }
 
 int Scene::first_clear(std::span<const Sight> W_segments, double near_m) const {
-  constexpr int kPacket = 16;
+  constexpr int kSights = 16;
   const auto count = static_cast<int>(W_segments.size());
-  if (count > kPacket) throw std::length_error("first_clear takes at most 16 segments");
+  if (count > kSights) throw std::length_error("first_clear takes at most 16 segments");
   if (count == 0) return -1;
   RTCRay16 rays;
-  alignas(64) int valid[kPacket];
-  for (int i = 0; i < kPacket; ++i) {
+  alignas(64) int valid[kSights];
+  for (int i = 0; i < kSights; ++i) {
     valid[i] = i < count ? -1 : 0;
     const Sight& sight = W_segments[i < count ? i : 0];
     const Eigen::Vector3d way = sight.to - sight.from;

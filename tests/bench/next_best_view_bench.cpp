@@ -15,7 +15,7 @@
 #include "planning/running_tally.hpp"
 #include "planning/stop_certificate.hpp"
 #include "tests/planning/voxel_oracle.hpp"
-#include "tests/planning/voxel_worlds.hpp"
+#include "tests/support/voxel_worlds.hpp"
 
 namespace {
 

@@ -17,7 +17,7 @@
 #include "planning/voxel_foliage.hpp"
 #include "planning/voxel_map.hpp"
 #include "tests/planning/voxel_oracle.hpp"
-#include "tests/planning/voxel_worlds.hpp"
+#include "tests/support/voxel_worlds.hpp"
 
 namespace {
 

@@ -4,7 +4,7 @@
 
 #include "mission/site_model.hpp"
 #include "nav/polygons.hpp"
-#include "tests/nav/scans.hpp"
+#include "tests/support/scans.hpp"
 
 namespace mission {
 namespace {

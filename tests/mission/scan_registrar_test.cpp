@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "mission/site_model.hpp"
-#include "tests/nav/scans.hpp"
+#include "tests/support/scans.hpp"
 
 namespace mission {
 namespace {

@@ -8,7 +8,7 @@
 #include "sim/scan.hpp"
 #include "sim/scene.hpp"
 #include "tests/planning/voxel_oracle.hpp"
-#include "tests/planning/voxel_worlds.hpp"
+#include "tests/support/voxel_worlds.hpp"
 
 namespace {
 

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "nav/polygons.hpp"
-#include "tests/planning/voxel_worlds.hpp"
+#include "tests/support/voxel_worlds.hpp"
 
 namespace mission {
 namespace {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "tests/nav/scans.hpp"
+#include "tests/support/scans.hpp"
 
 namespace {
 

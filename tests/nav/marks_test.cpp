@@ -6,7 +6,7 @@
 #include <Eigen/LU>
 
 #include "nav/linear.hpp"
-#include "tests/nav/scans.hpp"
+#include "tests/support/scans.hpp"
 
 namespace {
 

@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "nav/linear.hpp"
-#include "tests/nav/scans.hpp"
+#include "tests/support/scans.hpp"
 
 namespace {
 

@@ -7,7 +7,7 @@
 
 #include "nav/registration/cloud_file.hpp"
 #include "nav/registration/pose_graph.hpp"
-#include "tests/nav/scans.hpp"
+#include "tests/support/scans.hpp"
 
 namespace {
 

@@ -11,7 +11,7 @@
 
 #include "nav/linear.hpp"
 #include "nav/registration/icp.hpp"
-#include "tests/nav/scans.hpp"
+#include "tests/support/scans.hpp"
 
 namespace {
 

@@ -6,7 +6,7 @@
 
 #include "planning/tally_paths.hpp"
 #include "tests/planning/voxel_oracle.hpp"
-#include "tests/planning/voxel_worlds.hpp"
+#include "tests/support/voxel_worlds.hpp"
 
 namespace {
 

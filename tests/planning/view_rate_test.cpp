@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "tests/planning/voxel_worlds.hpp"
+#include "tests/support/voxel_worlds.hpp"
 
 namespace {
 

@@ -4,7 +4,7 @@
 
 #include "tests/planning/voxel_oracle.hpp"
 #include "tests/planning/voxel_scans.hpp"
-#include "tests/planning/voxel_worlds.hpp"
+#include "tests/support/voxel_worlds.hpp"
 
 namespace {
 

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "planning/voxel_map.hpp"
-#include "tests/planning/voxel_worlds.hpp"
+#include "tests/support/voxel_worlds.hpp"
 
 namespace worlds {
 

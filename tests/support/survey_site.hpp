@@ -7,8 +7,8 @@
 #include "mission/plan.hpp"
 #include "nav/free_space.hpp"
 #include "nav/polygons.hpp"
-#include "tests/planning/voxel_worlds.hpp"
 #include "tests/support/random_site.hpp"
+#include "tests/support/voxel_worlds.hpp"
 
 namespace support {
 

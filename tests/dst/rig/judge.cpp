@@ -121,15 +121,15 @@ void Judge::on_release() {
 }
 
 void Judge::on_order(const mission::ConsoleOrder& order) {
-  using Kind = mission::ConsoleOrder::Kind;
-  if (order.kind == Kind::stop) return on_stop_order();
-  const bool stands_still = order.kind == Kind::drive && !order.packet.dead_man;
-  if (order.kind == Kind::pause || stands_still) return;
+  using Order = mission::ConsoleOrder::Kind;
+  if (order.kind == Order::stop) return on_stop_order();
+  const bool stands_still = order.kind == Order::drive && !order.packet.dead_man;
+  if (order.kind == Order::pause || stands_still) return;
   if (!password_typed_)
     violated("nothing moves by a console at which nobody is logged in",
              fmt::format("order {}", static_cast<int>(order.kind)));
-  if (order.kind == Kind::drive) key_at_ = clock_.now();
-  if (order.kind == Kind::arm && survey_.gate().begun() && !survey_.gate().released()) on_release();
+  if (order.kind == Order::drive) key_at_ = clock_.now();
+  if (order.kind == Order::arm && survey_.gate().begun() && !survey_.gate().released()) on_release();
 }
 
 void Judge::on_stop_order() {

@@ -17,6 +17,7 @@
 #include <string_view>
 #include <vector>
 
+#include "drivers/bytes.hpp"
 #include "drivers/real_clock.hpp"
 #include "hal/links.hpp"
 #include "sim/link_faults.hpp"
@@ -26,7 +27,7 @@ namespace links_test {
 
 using namespace std::chrono_literals;
 using namespace boost::asio::experimental::awaitable_operators;
-using Bytes = std::vector<std::uint8_t>;
+using drivers::Bytes;
 
 struct Broken : std::runtime_error {
   using std::runtime_error::runtime_error;

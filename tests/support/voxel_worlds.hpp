@@ -27,16 +27,7 @@ struct Box {
 };
 
 // Distance along the unit direction to the box, or infinity.
-inline double hit(const Box& box, const Eigen::Vector3d& from, const Eigen::Vector3d& direction) {
-  double enter = 0, leave = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < 3; ++i) {
-    const double inverse = 1 / direction[i];
-    const double a = (box.min_m[i] - from[i]) * inverse, b = (box.max_m[i] - from[i]) * inverse;
-    enter = std::max(enter, std::min(a, b));
-    leave = std::min(leave, std::max(a, b));
-  }
-  return enter < leave ? enter : std::numeric_limits<double>::infinity();
-}
+double hit(const Box& box, const Eigen::Vector3d& from, const Eigen::Vector3d& direction);
 
 inline Eigen::Isometry3d upright(const Eigen::Vector3d& position_m, double heading_rad) {
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
@@ -72,50 +63,18 @@ inline Eigen::Vector3d direction_of(const hal::ScanPattern& pattern, std::uint32
 struct World {
   std::vector<Box> boxes;
 
-  double range_m(const Eigen::Vector3d& from, const Eigen::Vector3d& direction) const {
-    double range = std::numeric_limits<double>::infinity();
-    if (direction.z() < 0 && from.z() > 0) range = from.z() / -direction.z();
-    for (const Box& box : boxes) range = std::min(range, hit(box, from, direction));
-    return range;
-  }
+  double range_m(const Eigen::Vector3d& from, const Eigen::Vector3d& direction) const;
 
   // Beams that graze at less than drop_out_deg from the ground's plane come back with nothing.
   hal::ScanCloud scan(const hal::ScanPattern& pattern, const Eigen::Isometry3d& T_W_S,
                       double range_max_m, Random& random, double noise_m = 0.01,
-                      double drop_out_deg = 0) const {
-    hal::ScanCloud cloud;
-    cloud.pattern = pattern;
-    for (std::uint32_t c = 0; c < pattern.columns; ++c)
-      for (std::uint32_t r = 0; r < pattern.rows; ++r) {
-        const Eigen::Vector3d direction = T_W_S.linear() * direction_of(pattern, c, r);
-        const double range = range_m(T_W_S.translation(), direction);
-        const bool lost = direction.z() < 0 && -direction.z() < std::sin(drop_out_deg * kDegree);
-        const double noise = noise_m > 0 ? uniform(random, -noise_m, noise_m) : 0;
-        cloud.ranges_m.push_back(
-            range + noise > range_max_m || lost ? 0.0F : static_cast<float>(range + noise));
-      }
-    return cloud;
-  }
+                      double drop_out_deg = 0) const;
 };
 
 // Adds a bush to a scan: a beam that goes through its box is stopped in it with the given
 // probability per metre, if nothing stopped it before.
-inline void grow_bush(hal::ScanCloud& scan, const Eigen::Isometry3d& T_W_S, const Box& bush,
-                      double per_m, Random& random) {
-  std::size_t beam = 0;
-  for (std::uint32_t c = 0; c < scan.pattern.columns; ++c)
-    for (std::uint32_t r = 0; r < scan.pattern.rows; ++r, ++beam) {
-      const Eigen::Vector3d direction = T_W_S.linear() * direction_of(scan.pattern, c, r);
-      const double enter_m = hit(bush, T_W_S.translation(), direction);
-      if (!std::isfinite(enter_m)) continue;
-      const double stop_m = enter_m - std::log(uniform(random, 1e-9, 1)) / per_m;
-      const Eigen::Vector3d at = T_W_S.translation() + stop_m * direction;
-      float& range_m = scan.ranges_m[beam];
-      if ((at.array() >= bush.min_m.array()).all() && (at.array() <= bush.max_m.array()).all() &&
-          (range_m == 0 || stop_m < range_m))
-        range_m = static_cast<float>(stop_m);
-    }
-}
+void grow_bush(hal::ScanCloud& scan, const Eigen::Isometry3d& T_W_S, const Box& bush, double per_m,
+               Random& random);
 
 // Something like a fort of size_m x size_m: an outer wall with a gate, a ring of casemates around
 // a court, huts in the court and trees (boxes) outside. No roof is seen from the ground.
