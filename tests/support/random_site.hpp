@@ -57,7 +57,8 @@ struct SiteSize {
 inline nav::FreeArea random_area(Dice& dice, const SiteSize& size, double radius_m) {
   nav::Polygons buildings;
   for (int i = 0; i < size.obstacles; ++i) {
-    const Eigen::Vector2d center(dice.uniform(0, size.side_m), dice.uniform(0, size.side_m));
+    const double y_m = dice.uniform(0, size.side_m), x_m = dice.uniform(0, size.side_m);
+    const Eigen::Vector2d center(x_m, y_m);
     const int corners = 3 + dice.below(size.corners_max - 2);
     const double r = dice.uniform(0.3, 1.0) * size.obstacle_radius_m;
     buildings = nav::unite(buildings, {nav::Polygon{star_mm(dice, center, r, corners), {}}});
@@ -73,7 +74,8 @@ inline nav::FreeArea random_area(Dice& dice, const SiteSize& size, double radius
 // A random point of the polygons, or of the side_m square if they are empty.
 inline Eigen::Vector2d random_point(Dice& dice, const nav::Polygons& in, double side_m) {
   for (int tries = 0; tries < 10000; ++tries) {
-    const Eigen::Vector2d p(dice.uniform(0, side_m), dice.uniform(0, side_m));
+    const double y_m = dice.uniform(0, side_m), x_m = dice.uniform(0, side_m);
+    const Eigen::Vector2d p(x_m, y_m);
     if (nav::contains(in, nav::to_mm(p))) return p;
   }
   return {dice.uniform(0, side_m), dice.uniform(0, side_m)};

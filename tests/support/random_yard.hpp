@@ -58,9 +58,12 @@ struct RandomYard {
 
   void add_things(Dice& dice, std::vector<House>& to, int count, double low_m, double high_m) {
     for (int i = 0; i < count; ++i) {
-      const Eigen::Vector2d size(dice.uniform(low_m, high_m), dice.uniform(low_m, high_m));
-      const Eigen::Vector2d at(dice.uniform(0, side_m - size.x()),
-                               dice.uniform(0, side_m - size.y()));
+      // Drawn one after the other: a compiler evaluates arguments in the order it likes.
+      const double width_m = dice.uniform(low_m, high_m), length_m = dice.uniform(low_m, high_m);
+      const Eigen::Vector2d size(length_m, width_m);
+      const double y_m = dice.uniform(0, side_m - size.y()),
+                   x_m = dice.uniform(0, side_m - size.x());
+      const Eigen::Vector2d at(x_m, y_m);
       const House house{at, at + size};
       if (house.distance_m(kStart) > 2) to.push_back(house);
     }

@@ -129,7 +129,8 @@ void Judge::on_order(const mission::ConsoleOrder& order) {
     violated("nothing moves by a console at which nobody is logged in",
              fmt::format("order {}", static_cast<int>(order.kind)));
   if (order.kind == Order::drive) key_at_ = clock_.now();
-  if (order.kind == Order::arm && survey_.gate().begun() && !survey_.gate().released()) on_release();
+  if (order.kind == Order::arm && survey_.gate().begun() && !survey_.gate().released())
+    on_release();
 }
 
 void Judge::on_stop_order() {

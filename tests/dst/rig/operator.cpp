@@ -68,8 +68,10 @@ constexpr std::string_view kLines[]{"status",
 
 std::string draw_line(Dice& dice) {
   std::string line(kLines[static_cast<std::size_t>(dice.below(std::size(kLines)))]);
-  if (line == "goto 3 4")
-    line = fmt::format("goto {:.2f} {:.2f}", dice.uniform(-2, 18), dice.uniform(-2, 18));
+  if (line == "goto 3 4") {
+    const double y_m = dice.uniform(-2, 18), x_m = dice.uniform(-2, 18);
+    line = fmt::format("goto {:.2f} {:.2f}", x_m, y_m);
+  }
   return line + "\r";
 }
 
