@@ -1,5 +1,7 @@
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <string>
 
 #include "drivers/flir_ptu.hpp"
 #include "drivers/pan_fit.hpp"
@@ -216,6 +218,28 @@ INSTANTIATE_TEST_SUITE_P(
         if (c == '-') c = '_';
       return name;
     });
+
+hal::Task<void> listen(hal::ByteStream& line, std::string& heard) {
+  std::array<std::uint8_t, 64> buffer;
+  for (;;) {
+    const auto got = co_await line.read_some(buffer);
+    if (!got) co_return;
+    heard += as_text(ByteView(buffer).first(*got));
+  }
+}
+
+// GCC 12 compiled its set-up so that it went on with the next question.
+TEST_F(FlirPtuLoop, BeginsAnewWithAUnitThatDoesNotAnswer) {
+  wire.emplace(clock, sim::StreamWire::Config{});
+  device.emplace(FlirPtuConfig{}, clock, wire->a());
+  std::string heard;
+  spawn(listen(wire->b(), heard));
+  spawn(device->run());
+  run_for(20s);
+  EXPECT_TRUE(heard.starts_with(" ED  ED ")) << heard;
+  EXPECT_EQ(heard.find("PR"), std::string::npos) << heard;
+  halt_all();
+}
 
 TEST_F(FlirPtuLoop, ComesBackAfterTheCableWasOut) {
   build();
