@@ -184,8 +184,8 @@ TEST(Follow, StaysOnTheRoutesOfARoadmap) {
     const FreeArea area = support::random_area(rig.dice, {150, 60, 12, 9}, 0.5);
     const Roadmap roadmap = Roadmap::build(area, 0.5);
     for (int i = 0; i < 4; ++i) {
-      const auto route = roadmap.route(support::random_point(rig.dice, area.standable, 150),
-                                       support::random_point(rig.dice, area.standable, 150));
+      const auto to = support::random_point(rig.dice, area.standable, 150);
+      const auto route = roadmap.route(support::random_point(rig.dice, area.standable, 150), to);
       if (!route || route->length_m < 50) continue;
       FollowConfig config;
       const double heading = rig.dice.uniform(-M_PI, M_PI);
