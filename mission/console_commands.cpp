@@ -23,7 +23,7 @@ struct ConsoleSession::Command {
 namespace {
 
 constexpr std::size_t kLogLines = 10, kLogLinesMax = 20;
-constexpr double kFarM = 1e6, kTurnsDeg = 3600;
+constexpr double kFarthestM = 1e6, kTurnsDeg = 3600;
 
 // A finite number within +-limit; nothing: it is none.
 std::optional<double> number(std::string_view word, double limit) {
@@ -271,8 +271,8 @@ std::string ConsoleSession::teleop(const Words& words) {
 }
 
 std::string ConsoleSession::go(const Words& words) {
-  const auto x_m = words.size() > 2 ? number(words[1], kFarM) : std::nullopt;
-  const auto y_m = words.size() > 2 ? number(words[2], kFarM) : std::nullopt;
+  const auto x_m = words.size() > 2 ? number(words[1], kFarthestM) : std::nullopt;
+  const auto y_m = words.size() > 2 ? number(words[2], kFarthestM) : std::nullopt;
   if (!x_m || !y_m) return "goto takes two numbers, metres east and north: `goto 12.5 -3`";
   ConsoleOrder order{.kind = ConsoleOrder::Kind::go, .pose = {{*x_m, *y_m}, 0}};
   if (words.size() > 3) {

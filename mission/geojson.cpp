@@ -40,7 +40,7 @@ const std::vector<std::string>& geometry_types() {
   return all;
 }
 
-class Reader : JsonReader {
+class GeoJsonReader : JsonReader {
  public:
   using JsonReader::JsonReader;
 
@@ -427,7 +427,7 @@ class Reader : JsonReader {
 GeoJsonSite read_geojson(std::string_view text, const std::string& file_name) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
-  return Reader(text, file_name).run();
+  return GeoJsonReader(text, file_name).run();
 }
 
 }  // namespace mission

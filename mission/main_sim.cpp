@@ -274,7 +274,7 @@ void SimBackend::judge_poses(RunRecord& record, Truth& truth) const {
       truth.before_error_max_rad = std::max(
           truth.before_error_max_rad, std::abs(hal::wrapped(before.heading_rad - at.heading_rad)));
     }
-    nees += error.dot(scan.covariance.ldlt().solve(error));
+    nees += error.dot(scan.covariance.inverse() * error);
   }
   const double scans = static_cast<double>(std::max<std::size_t>(record.scans.size(), 1));
   truth.position_error_rms_m = std::sqrt(squares_m2 / scans);

@@ -75,7 +75,7 @@ std::optional<std::array<T, N>> numbers(std::string_view text) {
 }
 
 // What the header says; the comments of ours may be missing.
-struct Header {
+struct FileHeader {
   OctomapFormat format = OctomapFormat::full;
   std::string id;
   std::optional<std::array<double, 1>> resolution_m;
@@ -97,7 +97,7 @@ struct Header {
 };
 
 // Takes the header off the bytes. "" or what is wrong with it.
-std::string take_header(std::string_view& bytes, Header& header) {
+std::string take_header(std::string_view& bytes, FileHeader& header) {
   if (bytes.starts_with(kFirstLineBinary))
     header.format = OctomapFormat::binary;
   else if (!bytes.starts_with(kFirstLine))
@@ -141,7 +141,7 @@ struct Span {
 };
 
 // The grid our own header describes; empty when it does not, or not sensibly.
-std::optional<VoxelGrid> described_grid(const Header& header) {
+std::optional<VoxelGrid> described_grid(const FileHeader& header) {
   if (!header.W_min_m || !header.voxels) return std::nullopt;
   const auto& n = *header.voxels;
   const auto& low = *header.W_min_m;
@@ -212,7 +212,7 @@ FileResult<OctomapWritten> write_octomap(const std::filesystem::path& path, cons
 }
 
 FileResult<OctomapMap> parse_octomap(std::string_view bytes, const std::filesystem::path& path) {
-  Header header;
+  FileHeader header;
   if (auto wrong = take_header(bytes, header); !wrong.empty())
     return unreadable(path, std::move(wrong));
   // Twice through the tree, so that only the map itself takes memory.

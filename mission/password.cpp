@@ -16,7 +16,7 @@ namespace {
 
 constexpr unsigned long long kWork = crypto_pwhash_OPSLIMIT_INTERACTIVE;
 constexpr std::size_t kMemory = crypto_pwhash_MEMLIMIT_INTERACTIVE;
-constexpr std::size_t kFileMax = 1024;
+constexpr std::size_t kPasswordFileMax = 1024;
 
 bool sodium_ready() {
   static const bool ready = sodium_init() >= 0;
@@ -30,7 +30,7 @@ PasswordFile::PasswordFile(std::filesystem::path path) : path_(std::move(path)) 
   const auto status = std::filesystem::symlink_status(path_, ignored);
   if (status.type() == std::filesystem::file_type::not_found) return;
   exists_ = true;
-  auto read = read_file(path_, kFileMax);
+  auto read = read_file(path_, kPasswordFileMax);
   if (!read) {
     problem_ = read.error().text();
     return;

@@ -58,7 +58,7 @@ Eigen::Vector3d between(const hal::Pose2& from, const hal::Pose2& to) {
 }
 
 double chi2_of(const Eigen::Vector3d& way, const Eigen::Matrix3d& covariance) {
-  return way.dot(covariance.ldlt().solve(way));
+  return way.dot(covariance.inverse() * way);
 }
 
 // A pair says nothing of the directions that it leaves free.

@@ -4,14 +4,12 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "nav/segment_distance.hpp"
+
 namespace planning {
 namespace {
 
 using Eigen::Vector2d;
-
-double cross(const Vector2d& a, const Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
 
 double distance_m(const Vector2d& point_m, const WallLine& line) {
   const Vector2d along_m = line.W_to_m - line.W_from_m, to_m = point_m - line.W_from_m;
@@ -24,7 +22,7 @@ double distance_m(const Vector2d& point_m, const WallLine& line) {
 bool cross_each_other(const WallLine& a, const WallLine& b) {
   const auto apart = [](const WallLine& line, const Vector2d& p, const Vector2d& q) {
     const Vector2d along = line.W_to_m - line.W_from_m;
-    return cross(along, p - line.W_from_m) * cross(along, q - line.W_from_m) < 0;
+    return nav::cross2(along, p - line.W_from_m) * nav::cross2(along, q - line.W_from_m) < 0;
   };
   return apart(a, b.W_from_m, b.W_to_m) && apart(b, a.W_from_m, a.W_to_m);
 }

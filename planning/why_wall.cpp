@@ -5,16 +5,13 @@
 #include <stdexcept>
 
 #include "hal/angles.hpp"
+#include "nav/segment_distance.hpp"
 #include "nav/words.hpp"
 
 namespace planning {
 namespace {
 
 using Eigen::Vector2d;
-
-double cross(const Vector2d& a, const Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
 
 struct Meeting {
   int wall{};
@@ -31,10 +28,11 @@ std::optional<Meeting> first_met(const std::vector<Wall>& walls, int asked, cons
     const Wall& wall = walls[static_cast<std::size_t>(i)];
     if (i == asked || wall.a == wall.b) continue;
     const Vector2d a = nav::to_m(wall.a) - from_m, b = nav::to_m(wall.b) - from_m;
-    const double of_a = cross(way, a), of_b = cross(way, b), turn = cross(way, b - a);
+    const double of_a = nav::cross2(way, a), of_b = nav::cross2(way, b),
+                 turn = nav::cross2(way, b - a);
     if (ends_too ? of_a * of_b > 0 : of_a * of_b >= 0) continue;
     if (turn == 0) continue;
-    const double share = cross(a, b - a) / turn;
+    const double share = nav::cross2(a, b - a) / turn;
     if (share <= kTooNearTheEnds || share >= 1 - kTooNearTheEnds) continue;
     if (!first || share < first->share) first = Meeting{i, share};
   }
@@ -78,7 +76,7 @@ WhyWall why_wall(const Visibility& visibility, int wall, double at_m, const Cand
   why.excluded = outcome_at(visibility, wall, at_m, station);
   why.distance_m = way.norm();
   // The free side is on the right of a -> b.
-  why.angle_deg = hal::degrees(std::atan2(std::abs(way.dot(along)), cross(along, way)));
+  why.angle_deg = hal::degrees(std::atan2(std::abs(way.dot(along)), nav::cross2(along, way)));
   why.heading_deg = hal::degrees(
       std::remainder(std::atan2(way.y(), way.x()) - station.heading_rad, 2 * std::numbers::pi));
   if (why.excluded != Excluded::occluded) return why;

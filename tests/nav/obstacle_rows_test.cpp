@@ -22,11 +22,11 @@ struct Post {
   double radius_m, low_m, high_m;
 };
 
-struct Ground {
+struct Slope {
   double rise = 0;  // So much a metre, to the east.
 };
 
-double range_m(const std::vector<Post>& posts, const Ground& ground, const Vector2d& from_m,
+double range_m(const std::vector<Post>& posts, const Slope& ground, const Vector2d& from_m,
                const Vector2d& way, double tip_m, double elevation_rad) {
   const double slope = std::tan(elevation_rad), share = std::cos(elevation_rad);
   double nearest_m = 1e9;
@@ -44,7 +44,7 @@ double range_m(const std::vector<Post>& posts, const Ground& ground, const Vecto
 }
 
 MovingTurn turn(const std::vector<Post>& posts, const hal::Pose2& first, const hal::Pose2& last,
-                const Ground& ground = {}) {
+                const Slope& ground = {}) {
   MovingTurn seen;
   seen.height_m = kScannerM;
   seen.W_first = first;
@@ -66,7 +66,7 @@ MovingTurn turn(const std::vector<Post>& posts, const hal::Pose2& first, const h
   return seen;
 }
 
-MovingTurn turn(const std::vector<Post>& posts, const hal::Pose2& at, const Ground& ground = {}) {
+MovingTurn turn(const std::vector<Post>& posts, const hal::Pose2& at, const Slope& ground = {}) {
   return turn(posts, at, at, ground);
 }
 

@@ -147,7 +147,7 @@ int expect_same_ground(Dice& dice, const Drawing& drawing, const nav::Polygons& 
   return asked;
 }
 
-SensorLimits random_limits(Dice& dice) {
+SensorLimits all_limits(Dice& dice) {
   return {.range_min_m = dice.uniform(0, 3),
           .range_max_m = dice.uniform(8, 60),
           .grazing_max_deg = dice.uniform(30, 90),
@@ -158,7 +158,7 @@ SensorLimits random_limits(Dice& dice) {
 // which floating point cannot tell, are left out.
 int expect_same_sight(Dice& dice, const std::vector<Wall>& walls, const Candidate& from) {
   constexpr double kHairM = 1e-5;
-  const SensorLimits limits = random_limits(dice);
+  const SensorLimits limits = all_limits(dice);
   const auto seen = Visibility(walls, limits).from(from);
   int asked = 0;
   auto piece = seen.begin();
