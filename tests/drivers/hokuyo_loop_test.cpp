@@ -11,7 +11,7 @@ namespace {
 using namespace std::chrono_literals;
 using drivers_test::FailsOnce;
 using sim::UnitFault;
-constexpr double kDeg = std::numbers::pi / 180;
+constexpr double kRadPerDeg = std::numbers::pi / 180;
 
 sim::HokuyoUnitConfig exact() {
   return drivers_test::exact<sim::HokuyoUnitConfig>();
@@ -37,8 +37,8 @@ TEST_F(HokuyoLoop, StartsIdentifiesAndMeasures) {
   const auto profiles = take(100);
   ASSERT_EQ(profiles.size(), 100U);
   EXPECT_EQ(profiles[0].ranges_m.size(), 1081U);
-  EXPECT_NEAR(profiles[0].angle_first_rad, -135 * kDeg, 1e-9);
-  EXPECT_NEAR(profiles[0].angle_step_rad, 0.25 * kDeg, 1e-9);
+  EXPECT_NEAR(profiles[0].angle_first_rad, -135 * kRadPerDeg, 1e-9);
+  EXPECT_NEAR(profiles[0].angle_step_rad, 0.25 * kRadPerDeg, 1e-9);
   EXPECT_NEAR(profiles[0].beam_period_s, 0.025 / 1440, 1e-9);
   EXPECT_EQ(device->lost(), 0U);
   const double ahead_m = std::min(5 / std::cos(0.3), 5.5 / std::sin(0.3));
@@ -78,7 +78,7 @@ TEST_F(HokuyoLoop, SendsIntensitiesOfAPartOfTheCircle) {
   ASSERT_EQ(profiles.size(), 3U);
   EXPECT_EQ(profiles[2].ranges_m.size(), 721U);
   EXPECT_EQ(profiles[2].intensities.size(), 721U);
-  EXPECT_NEAR(profiles[0].angle_first_rad, -90 * kDeg, 1e-9);
+  EXPECT_NEAR(profiles[0].angle_first_rad, -90 * kRadPerDeg, 1e-9);
 }
 
 TEST_F(HokuyoLoop, RefusesAnotherModel) {
@@ -123,11 +123,11 @@ TEST_F(HokuyoLoop, TakesOverAScannerThatStreamsAlready) {
   EXPECT_TRUE(start());
 }
 
-struct FaultCase {
+struct HokuyoFaultCase {
   sim::FaultSetting setting;
   std::string trouble;
 };
-class HokuyoFault : public HokuyoLoop, public testing::WithParamInterface<FaultCase> {};
+class HokuyoFault : public HokuyoLoop, public testing::WithParamInterface<HokuyoFaultCase> {};
 
 TEST_P(HokuyoFault, IsNamedAndEndsWithIt) {
   build();
@@ -147,15 +147,15 @@ TEST_P(HokuyoFault, IsNamedAndEndsWithIt) {
 
 INSTANTIATE_TEST_SUITE_P(
     All, HokuyoFault,
-    testing::Values(FaultCase{{UnitFault::off, 0}, "scans stopped"},
-                    FaultCase{{UnitFault::stuck, 0}, "same scan again and again"},
-                    FaultCase{{UnitFault::garbage, 0}, "not SCIP"},
-                    FaultCase{{UnitFault::wrong, 0.5}, "scans too slow"},
-                    FaultCase{{UnitFault::slow, 2.5},
-                              "scans too slow"},  // A whole factor looks like loss.
-                    FaultCase{{UnitFault::delayed, 0.5}, "scans come late"},
-                    FaultCase{{UnitFault::intermittent, 0.4}, "scans get lost"},
-                    FaultCase{{UnitFault::duplicated_reordered, 0}, "scans out of order"}),
+    testing::Values(HokuyoFaultCase{{UnitFault::off, 0}, "scans stopped"},
+                    HokuyoFaultCase{{UnitFault::stuck, 0}, "same scan again and again"},
+                    HokuyoFaultCase{{UnitFault::garbage, 0}, "not SCIP"},
+                    HokuyoFaultCase{{UnitFault::wrong, 0.5}, "scans too slow"},
+                    HokuyoFaultCase{{UnitFault::slow, 2.5},
+                                    "scans too slow"},  // A whole factor looks like loss.
+                    HokuyoFaultCase{{UnitFault::delayed, 0.5}, "scans come late"},
+                    HokuyoFaultCase{{UnitFault::intermittent, 0.4}, "scans get lost"},
+                    HokuyoFaultCase{{UnitFault::duplicated_reordered, 0}, "scans out of order"}),
     [](const auto& each) {
       std::string name = sim::to_text(each.param.setting);
       name = name.substr(0, name.find(':'));

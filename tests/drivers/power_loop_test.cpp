@@ -324,16 +324,17 @@ TEST_F(PowerLoop, WithoutAnEstopInputItIsPressedForEver) {
 // --- Every fault of every unit.
 
 enum class Whose { battery, board, safety };
-struct Case {
+struct PowerFaultCase {
   sim::FaultSetting setting;
   std::array<std::string_view, 3> named;  // Of battery, board, safety controller.
 };
 
-void PrintTo(const Case& fault, std::ostream* out) {
+void PrintTo(const PowerFaultCase& fault, std::ostream* out) {
   *out << sim::to_text(fault.setting);
 }
 
-class PowerFault : public PowerLoop, public testing::WithParamInterface<std::tuple<Case, Whose>> {};
+class PowerFault : public PowerLoop,
+                   public testing::WithParamInterface<std::tuple<PowerFaultCase, Whose>> {};
 
 TEST_P(PowerFault, IsNamedAndOvercome) {
   const auto& [fault, whose] = GetParam();
@@ -381,25 +382,26 @@ std::string case_name(const testing::TestParamInfo<PowerFault::ParamType>& its) 
 INSTANTIATE_TEST_SUITE_P(
     AllEight, PowerFault,
     testing::Combine(
-        testing::Values(Case{{UnitFault::off, 0},
-                             {"no answer (battery", "no answer (relay board", "no answer (safety"}},
-                        Case{{UnitFault::stuck, 0}, {"", "relay does not follow (channel 3)", ""}},
-                        Case{{UnitFault::garbage, 0},
-                             {"damaged replies (battery", "damaged replies (relay board",
-                              "damaged replies (safety"}},
-                        Case{{UnitFault::wrong, 0.5},
-                             {"battery values disagree", "e-stop contacts contradict each other",
-                              "safety controller fault"}},
-                        Case{{UnitFault::slow, 3},
-                             {"answers late (battery", "answers late (relay board",
-                              "answers late (safety"}},
-                        Case{{UnitFault::delayed, 0.5},
-                             {"no answer (battery", "no answer (relay board", "no answer (safety"}},
-                        Case{{UnitFault::intermittent, 2},
-                             {"no answer (battery", "no answer (relay board", "no answer (safety"}},
-                        Case{{UnitFault::duplicated_reordered, 0},
-                             {"damaged replies (battery", "damaged replies (relay board",
-                              "damaged replies (safety"}}),
+        testing::Values(
+            PowerFaultCase{{UnitFault::off, 0},
+                           {"no answer (battery", "no answer (relay board", "no answer (safety"}},
+            PowerFaultCase{{UnitFault::stuck, 0}, {"", "relay does not follow (channel 3)", ""}},
+            PowerFaultCase{{UnitFault::garbage, 0},
+                           {"damaged replies (battery", "damaged replies (relay board",
+                            "damaged replies (safety"}},
+            PowerFaultCase{{UnitFault::wrong, 0.5},
+                           {"battery values disagree", "e-stop contacts contradict each other",
+                            "safety controller fault"}},
+            PowerFaultCase{
+                {UnitFault::slow, 3},
+                {"answers late (battery", "answers late (relay board", "answers late (safety"}},
+            PowerFaultCase{{UnitFault::delayed, 0.5},
+                           {"no answer (battery", "no answer (relay board", "no answer (safety"}},
+            PowerFaultCase{{UnitFault::intermittent, 2},
+                           {"no answer (battery", "no answer (relay board", "no answer (safety"}},
+            PowerFaultCase{{UnitFault::duplicated_reordered, 0},
+                           {"damaged replies (battery", "damaged replies (relay board",
+                            "damaged replies (safety"}}),
         testing::Values(Whose::battery, Whose::board, Whose::safety)),
     case_name);
 

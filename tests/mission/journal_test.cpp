@@ -140,7 +140,7 @@ TEST_F(JournalTest, KeepsEveryAcknowledgedEventThroughKills) {
     waitpid(child, &status, 0);
     ASSERT_TRUE(WIFSIGNALED(status)) << "it ended by itself: " << WEXITSTATUS(status);
     std::int64_t number = 0;
-    while (read(ends[0], &number, sizeof number) == sizeof number) {
+    while (::read(ends[0], &number, sizeof number) == sizeof number) {
       ASSERT_EQ(number, acknowledged + 1) << "after kill " << i;
       acknowledged = number;
     }

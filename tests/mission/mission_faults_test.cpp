@@ -11,7 +11,7 @@ using testing::AllOf;
 using testing::HasSubstr;
 
 // Something that is wrong with a unit from a time on, for a while.
-struct Broken {
+struct BrokenDevice {
   const char* name;
   const char* role;
   const char* fault;  // "" : the e-stop of the base; "cut": the bus.
@@ -24,7 +24,7 @@ struct Broken {
 
 constexpr hal::Duration kEver = 24h;
 
-void breaks(mission::SimBackend& backend, const Broken& broken, bool on) {
+void breaks(mission::SimBackend& backend, const BrokenDevice& broken, bool on) {
   const std::string fault = broken.fault;
   if (fault.empty()) {
     backend.units().agilex()->press_estop(on);
@@ -37,14 +37,14 @@ void breaks(mission::SimBackend& backend, const Broken& broken, bool on) {
   }
 }
 
-void PrintTo(const Broken& broken, std::ostream* to) {
+void PrintTo(const BrokenDevice& broken, std::ostream* to) {
   *to << broken.name;
 }
 
-class BrokenMission : public testing::TestWithParam<Broken> {};
+class BrokenMission : public testing::TestWithParam<BrokenDevice> {};
 
 TEST_P(BrokenMission, GoesOnOrEndsWithItsReason) {
-  const Broken& broken = GetParam();
+  const BrokenDevice& broken = GetParam();
   const mission_test::SmallSite site;
   int phase = 0;
   const auto outcome = site.run([&](mission::SimBackend& backend) {
@@ -70,30 +70,32 @@ TEST_P(BrokenMission, GoesOnOrEndsWithItsReason) {
 // The drive's faults begin on the way to the second station, the others' before the first scan.
 INSTANTIATE_TEST_SUITE_P(
     Devices, BrokenMission,
-    testing::Values(
-        Broken{"PanOffForGood", "pan", "off", 5s, kEver, false, "no scan, tried 3 times", "pan ("},
-        Broken{"PanStuckForGood", "pan", "stuck", 5s, kEver, false, "no scan, tried 3 times",
-               "pan ("},
-        Broken{"ScannerOffForGood", "scanner", "off", 5s, kEver, false, "no scan, tried 3 times",
-               "scanner ("},
-        Broken{"ScannerGarbageForGood", "scanner", "garbage", 5s, kEver, false,
-               "no scan, tried 3 times", "scanner ("},
-        Broken{"PanOffForAWhile", "pan", "off", 5s, 20s, true, "", ""},
-        Broken{"ScannerOffForAWhile", "scanner", "off", 5s, 10s, true, "", ""},
-        Broken{"DriveOffForGood", "drive", "off", 50s, kEver, false, "on the way to",
-               "no reports from the base"},
-        Broken{"DriveOffForAWhile", "drive", "off", 50s, 30s, true, "", ""},
-        Broken{"BusCutForGood", "drive", "cut", 50s, kEver, false, "on the way to", "CAN bus down"},
-        Broken{"BusCutForAWhile", "drive", "cut", 50s, 20s, true, "", ""},
-        Broken{"EstopForGood", "drive", "", 50s, kEver, false, "held by its e-stop",
-               "e-stop pressed"},
-        Broken{"EstopForAWhile", "drive", "", 50s, 300s, true, "", ""},
-        Broken{"DriveOffForAWhileAndNobodyReleases", "drive", "off", 50s, 30s, false,
-               "on the way to", "to release it, press the reset button", false},
-        Broken{"EstopForAWhileAndNobodyReleases", "drive", "", 50s, 30s, false, "on the way to",
-               "F001-estop-pressed", false},
-        Broken{"ImuOffForGood", "imu", "off", 50s, kEver, true, "", ""},
-        Broken{"GnssOffForGood", "gnss", "off", 50s, kEver, true, "", ""}),
+    testing::Values(BrokenDevice{"PanOffForGood", "pan", "off", 5s, kEver, false,
+                                 "no scan, tried 3 times", "pan ("},
+                    BrokenDevice{"PanStuckForGood", "pan", "stuck", 5s, kEver, false,
+                                 "no scan, tried 3 times", "pan ("},
+                    BrokenDevice{"ScannerOffForGood", "scanner", "off", 5s, kEver, false,
+                                 "no scan, tried 3 times", "scanner ("},
+                    BrokenDevice{"ScannerGarbageForGood", "scanner", "garbage", 5s, kEver, false,
+                                 "no scan, tried 3 times", "scanner ("},
+                    BrokenDevice{"PanOffForAWhile", "pan", "off", 5s, 20s, true, "", ""},
+                    BrokenDevice{"ScannerOffForAWhile", "scanner", "off", 5s, 10s, true, "", ""},
+                    BrokenDevice{"DriveOffForGood", "drive", "off", 50s, kEver, false,
+                                 "on the way to", "no reports from the base"},
+                    BrokenDevice{"DriveOffForAWhile", "drive", "off", 50s, 30s, true, "", ""},
+                    BrokenDevice{"BusCutForGood", "drive", "cut", 50s, kEver, false,
+                                 "on the way to", "CAN bus down"},
+                    BrokenDevice{"BusCutForAWhile", "drive", "cut", 50s, 20s, true, "", ""},
+                    BrokenDevice{"EstopForGood", "drive", "", 50s, kEver, false,
+                                 "held by its e-stop", "e-stop pressed"},
+                    BrokenDevice{"EstopForAWhile", "drive", "", 50s, 300s, true, "", ""},
+                    BrokenDevice{"DriveOffForAWhileAndNobodyReleases", "drive", "off", 50s, 30s,
+                                 false, "on the way to", "to release it, press the reset button",
+                                 false},
+                    BrokenDevice{"EstopForAWhileAndNobodyReleases", "drive", "", 50s, 30s, false,
+                                 "on the way to", "F001-estop-pressed", false},
+                    BrokenDevice{"ImuOffForGood", "imu", "off", 50s, kEver, true, "", ""},
+                    BrokenDevice{"GnssOffForGood", "gnss", "off", 50s, kEver, true, "", ""}),
     [](const auto& param) { return std::string(param.param.name); });
 
 // 75 deg/s: within the angles of the robot file, and more than the unit's 60.

@@ -34,7 +34,7 @@ const sim::Scene& yard_with_crate() {
   return *scene;
 }
 
-nav::FreeArea yard() {
+nav::FreeArea open_yard() {
   const auto far = static_cast<std::int32_t>(kYardM * 1000);
   nav::FreeArea area;
   area.drivable = nav::normalise({nav::Ring{{0, 0}, {far, 0}, {far, far}, {0, far}}});
@@ -61,7 +61,7 @@ struct Yard {
     hal::Devices devices = robot.devices();
     hal::Devices all{drive, devices.imu, devices.gnss, devices.scanner, devices.placement};
     mission::Pilot pilot({}, clock, all, kStart);
-    mission::Roads roads(yard(), 0.5);
+    mission::Roads roads(open_yard(), 0.5);
     spawn(pilot.track());
     std::optional<mission::LegEnd> end;
     boost::asio::co_spawn(io, pilot.drive_to(roads, kGoal),

@@ -40,9 +40,9 @@ class Recorder final : public hal::Scanner {
 };
 
 // A mission on that site, and the survey as it stands at its end.
-class Mission {
+class LyingMission {
  public:
-  explicit Mission(std::set<int> lies = {}, int views_max = 2)
+  explicit LyingMission(std::set<int> lies = {}, int views_max = 2)
       : site_(mission_test::kQuickRobot, views_max),
         ready_(mission_test::crossing(site_)),
         backend_(ready_.config, ready_.tasks, std::move(ready_.sim), 1),
@@ -109,7 +109,7 @@ class Mission {
 };
 
 TEST(SurveyRegisters, TheMapIsTheOneThatTheCorrectedPosesGive) {
-  const Mission mission;
+  const LyingMission mission;
   const mission::RunRecord& record = mission.record();
   ASSERT_TRUE(record.completed) << record.end;
   ASSERT_GE(record.scans.size(), 4U);
@@ -123,7 +123,7 @@ TEST(SurveyRegisters, TheMapIsTheOneThatTheCorrectedPosesGive) {
 }
 
 TEST(SurveyRegisters, TheFilesHaveTheCorrectedPoses) {
-  const Mission mission;
+  const LyingMission mission;
   for (const mission::ScanRecord& scan : mission.record().scans) {
     const auto file = mission::read_ply(mission.folder() / "scans" /
                                         ("000" + std::to_string(scan.number) + ".ply"));
@@ -134,7 +134,7 @@ TEST(SurveyRegisters, TheFilesHaveTheCorrectedPoses) {
 }
 
 TEST(SurveyRegisters, EveryDecisionIsOnOneLineWithItsFigures) {
-  const Mission mission;
+  const LyingMission mission;
   const auto registered = mission.decisions("registration");
   ASSERT_GE(registered.size(), mission.record().scans.size());
   EXPECT_EQ(registered.front().at("verdict").as_string(), "overlaps none");
@@ -153,7 +153,7 @@ TEST(SurveyRegisters, EveryDecisionIsOnOneLineWithItsFigures) {
 
 // The first that is laid over others when all goes well: its number.
 int first_accepted() {
-  const Mission mission;
+  const LyingMission mission;
   for (const mission::ScanRecord& scan : mission.record().scans)
     if (scan.fit.verdict == ScanVerdict::accepted) return scan.number;
   ADD_FAILURE() << "none is accepted";
@@ -162,7 +162,7 @@ int first_accepted() {
 
 TEST(SurveyRegisters, AScanThatContradictsTheOthersIsTakenAgain) {
   const int number = first_accepted();
-  const Mission mission({number});
+  const LyingMission mission({number});
   const mission::RunRecord& record = mission.record();
   ASSERT_TRUE(record.completed) << record.end;
   EXPECT_EQ(record.registration.retaken, 1);
@@ -174,7 +174,7 @@ TEST(SurveyRegisters, AScanThatContradictsTheOthersIsTakenAgain) {
 
 TEST(SurveyRegisters, AScanThatContradictsTheOthersTwiceIsNotMerged) {
   const int number = first_accepted();
-  const Mission mission({number, number + 1});
+  const LyingMission mission({number, number + 1});
   const mission::RunRecord& record = mission.record();
   ASSERT_TRUE(record.completed) << record.end;
   EXPECT_EQ(record.registration.retaken, 1);
