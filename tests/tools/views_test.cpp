@@ -172,7 +172,8 @@ TEST_F(Views, NbvFacesAndCountsAsTheMissionDoesWithANarrowScannerADensityGoalAnd
   for (const int views : {0, 1}) {
     const std::string name = "narrow" + std::to_string(views);
     std::ofstream(mission(name)) << "robot = 'narrow.toml'\nsite = '" << site("courtyard")
-                                 << "'\n[phase1]\ngain_min = 0.05\n[phase2]\nheight_m = 52.0\n"
+                                 << "'\n[register]\ntour_end = false\n[phase1]\ngain_min = 0.05\n"
+                                    "[phase2]\nheight_m = 52.0\n"
                                     "density_min_ppm2 = 60\nfoliage = true\nviews_max = "
                                  << views << "\n";
     ASSERT_EQ(test::run_program("vantaged", mission(name) + " --quiet --out " + run_of(name),

@@ -4,8 +4,10 @@
 // must always hold, and says how to see it again.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <string>
+#include <thread>
 
 #include "mission/main_command_line.hpp"
 #include "tests/dst/rig/matrix.hpp"
@@ -17,7 +19,8 @@ namespace {
 struct Asked {
   std::uint64_t seed = 1;
   std::optional<std::uint64_t> replay;
-  int missions = 200, jobs = 1;
+  int missions = 200;
+  int jobs = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 256);
   bool matrix = false, verbose = false;
   std::string cell;
   double soak_hours = 0;
@@ -99,7 +102,8 @@ int main(int argc, char** argv) {
   line.add("--seed", &asked.seed, "of the first mission", {.shows_default = true});
   line.add("--missions", &asked.missions, "how many, with seeds one after the other",
            {.within = {{1, 100'000'000}}, .shows_default = true});
-  line.add("--jobs", &asked.jobs, "threads", {.within = {{1, 256}}, .shows_default = true});
+  line.add("--jobs", &asked.jobs, "at once; as many as there are processors",
+           {.within = {{1, 256}}, .shows_default = true});
   line.add("--verbose", &asked.verbose, "a line for each mission; of a cell of the matrix all");
   line.add("--matrix", &asked.matrix, "every fault of every device once, with its reaction");
   line.add("--cell", &asked.cell, "of the matrix only this one: \"imu:slow\"");

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <map>
 #include <mutex>
 #include <thread>
@@ -69,19 +70,25 @@ std::string Sums::text() const {
   return fmt::format(
       "{} missions, {} completed, {} gone on with, {} scans, {:.1f} km, {} stops, the slowest "
       "after {:.1f} ms; "
-      "{:.1f} h of virtual time in {:.1f} s of a core: {:.0f} times real time; {} violated\n",
+      "{:.1f} h of virtual time in {:.1f} s: {:.0f} times real time with {} at once, {:.0f} times "
+      "on one core; {} violated\n",
       missions, completed, resumed, scans, driven_m / 1000, stops,
-      1000 * hal::seconds(slowest_stop), virtual_s / 3600, cpu_s, factor(), violated);
+      1000 * hal::seconds(slowest_stop), virtual_s / 3600, wall_s, factor(), jobs, factor_of_core(),
+      violated);
 }
 
 Sums run_seeds(std::uint64_t first, int count, int jobs,
                const std::function<void(std::uint64_t, const Outcome&)>& each) {
+  const auto begin = std::chrono::steady_clock::now();
   Line line(first, count, each);
   std::vector<std::jthread> threads;
   for (int i = 1; i < jobs; ++i) threads.emplace_back([&line] { line.work(); });
   line.work();
   threads.clear();
-  return line.sums();
+  Sums sums = line.sums();
+  sums.jobs = jobs;
+  sums.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return sums;
 }
 
 }  // namespace dst

@@ -12,10 +12,13 @@ struct Sums {
   int missions{}, completed{}, resumed{}, stops{}, violated{};
   std::size_t scans{};
   double virtual_s{}, cpu_s{}, driven_m{};  // Of all threads together.
+  double wall_s{};                          // By the clock, from the first to the last.
+  int jobs{};
   hal::Duration slowest_stop{};
 
   void add(const Outcome& outcome);
-  double factor() const { return virtual_s / cpu_s; }  // Times real time, on one core.
+  double factor() const { return virtual_s / wall_s; }         // Times real time, by the clock.
+  double factor_of_core() const { return virtual_s / cpu_s; }  // On one core.
   std::string text() const;
 };
 
