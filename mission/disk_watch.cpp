@@ -26,6 +26,10 @@ std::string DiskWatch::text() const {
   return well() ? std::string() : fault_text(files_ ? *files_ : *journal_);
 }
 
+std::string DiskWatch::why() const {
+  return well() ? std::string() : (files_ ? *files_ : *journal_).text();
+}
+
 DiskWatch::Answer DiskWatch::answer(hal::Time now) const {
   if (goes_home_) return Answer::goes_home;
   if (well()) return Answer::goes_on;

@@ -35,6 +35,7 @@ class DiskWatch {
   // disk_full, disk_failed, or disk_read_only. Nothing: well. Does not allocate.
   std::optional<FaultCode> fault() const;
   std::string text() const;  // "F700-disk-full: cannot write ...", or "" when it is well.
+  std::string why() const;   // "cannot write ...", or "".
   bool given_up(hal::Time now) const { return !well() && now - since_ > patience_; }
   Answer answer(hal::Time now) const;
   bool goes_home() const { return goes_home_; }

@@ -11,7 +11,7 @@ namespace {
 void add(std::vector<FaultNow>& faults, FaultCode code, std::string detail) {
   if (code == FaultCode::nothing_wrong) return;
   const auto same = [&](const FaultNow& each) {
-    return each.code == code && each.detail == detail;
+    return each.code == code && (detail.empty() || each.detail == detail);
   };
   if (std::ranges::none_of(faults, same)) faults.push_back({code, std::move(detail)});
 }
@@ -28,11 +28,12 @@ double worse_sigma_m(const Eigen::Matrix3d& covariance) {
 }  // namespace
 
 std::vector<FaultNow> faults_now(const RobotDrivers& drivers, const LinkTroubles& link_troubles,
-                                 const GatedDrive& gate, bool home_for_disk) {
+                                 const GatedDrive& gate, const DiskWatch& disk) {
   std::vector<FaultNow> faults;
+  if (disk.goes_home()) add(faults, FaultCode::disk_given_up, "");
+  if (const auto fault = disk.fault()) add(faults, *fault, disk.why());
   if (const auto by = gate.stopped_by()) add(faults, *by, "latched: it wants a release");
   if (const auto by = gate.held_by()) add(faults, *by, "");
-  if (home_for_disk) add(faults, FaultCode::disk_given_up, "");
   for (const NamedDevice& named : drivers.devices()) {
     if (link_troubles)
       for (const drivers::Trouble& trouble : link_troubles(named.role))
@@ -60,7 +61,7 @@ ConsoleFacts RobotConsole::facts() const {
   facts.pose = parts_.survey.pilot().pose();
   facts.sigma_m = worse_sigma_m(parts_.survey.pilot().covariance());
   facts.faults =
-      faults_now(parts_.drivers, parts_.link_troubles, gate, parts_.survey.goes_home_for_disk());
+      faults_now(parts_.drivers, parts_.link_troubles, gate, parts_.survey.disk());
   return facts;
 }
 

@@ -23,7 +23,7 @@ using LinkTroubles = std::function<std::vector<drivers::Trouble>(std::string_vie
 
 // Everything that is wrong now, the gravest first, each once.
 std::vector<FaultNow> faults_now(const RobotDrivers& drivers, const LinkTroubles& link_troubles,
-                                 const GatedDrive& gate, bool home_for_disk);
+                                 const GatedDrive& gate, const DiskWatch& disk);
 
 // A robot with its mission, as consoles see it.
 class RobotConsole final : public ConsoleRobot {

@@ -84,6 +84,7 @@ class Survey {
     return goes_home_for_disk() ? std::nullopt : disk_.fault();
   }
   bool goes_home_for_disk() const { return disk_.goes_home(); }
+  const DiskWatch& disk() const { return disk_; }
   const std::optional<Progress>& shown() const { return shown_; }  // The latest; nothing: none yet.
 
  private:

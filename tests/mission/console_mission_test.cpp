@@ -9,6 +9,7 @@
 #include "mission/main_gate.hpp"
 #include "tests/mission/console_person.hpp"
 #include "tests/mission/console_talk.hpp"
+#include "tests/mission/disk_trace.hpp"
 #include "tests/mission/mission_site.hpp"
 
 namespace {
@@ -26,8 +27,9 @@ std::string read(const std::filesystem::path& path) {
 // A mission in its yard, and who sits at its console, logged in.
 class Mission {
  public:
-  Mission()
-      : ready_(site_.prepared()),
+  // With what the mission's file says besides.
+  explicit Mission(std::string_view more = {})
+      : ready_(prepared_with(more)),
         backend_(ready_.config, ready_.tasks, std::move(ready_.sim), 1),
         store_(mission::RunStore::open(site_.out()).value()),
         survey_(ready_.config, ready_.site.map, ready_.tasks, 1,
@@ -102,6 +104,10 @@ class Mission {
   const hal::Pose2& start() const { return ready_.tasks.start; }
 
  private:
+  mission::Prepared prepared_with(std::string_view more) {
+    std::ofstream(site_.folder() / "mission.toml", std::ios::app) << more;
+    return site_.prepared();
+  }
   hal::Task<void> carry_out() {
     (void)co_await backend_.drivers().started(60s);
     co_await mission::arm(backend_.gate());
@@ -271,6 +277,40 @@ TEST(ConsoleMission, ThatIsOnItsWayHomeNeedsNobodyToSendIt) {
   ASSERT_TRUE(mission.run_to_the_end());
   EXPECT_EQ(mission.record().end, end);
   EXPECT_TRUE(mission.record().completed) << mission.failure();
+  EXPECT_LT((mission.where().position_m - mission.start().position_m).norm(), 0.5);
+}
+
+TEST(ConsoleMission, SaysWhyTheRobotGoesHomeWithoutItsDisk) {
+  bool disk_fails = false;
+  int failed = 0;
+  mission_test::DiskTrace disk([&](mission_test::DiskOp::Kind kind) {
+    using enum mission_test::DiskOp::Kind;
+    if (!disk_fails || (kind != write && kind != sync)) return 0;
+    ++failed;
+    return ENOSPC;
+  });
+  disk.record = false;
+  Mission mission("[disk]\npatience_s = 20\nthen = \"home\"\n");
+  ASSERT_TRUE(mission.run_until([&] { return mission.record().scans.size() == 1; }));
+  ASSERT_TRUE(mission.run_until_driven(2));
+  EXPECT_THAT(mission.ask("faults\r"), Not(HasSubstr("F70")));
+
+  disk_fails = true;
+  ASSERT_TRUE(mission.run_until([&] { return failed > 0; }));
+  mission.wait(15s);
+  EXPECT_THAT(mission.ask("faults\r"),
+              AllOf(HasSubstr("F700-disk-full hold: cannot "), Not(HasSubstr("F704"))));
+  mission.wait(15s);
+  ASSERT_GT(mission.speed_mps(), 0) << "it waits no longer";
+  EXPECT_THAT(mission.ask("faults\r"),
+              AllOf(HasSubstr("F704-disk-given-up home: "), HasSubstr("F700-disk-full hold: ")));
+  EXPECT_THAT(mission.ask("status\r"), AllOf(HasSubstr("sent home by its disk"), HasSubstr("F70")));
+  disk_fails = false;  // That sends it nowhere else.
+  mission.wait(3s);
+  EXPECT_THAT(mission.ask("faults\r"),
+              AllOf(HasSubstr("F704-disk-given-up"), Not(HasSubstr("F700"))));
+  ASSERT_TRUE(mission.run_to_the_end());
+  EXPECT_THAT(mission.record().end, testing::StartsWith("F704-disk-given-up"));
   EXPECT_LT((mission.where().position_m - mission.start().position_m).norm(), 0.5);
 }
 
