@@ -236,7 +236,7 @@ constexpr FaultEntry kFaultTable[] = {
      "its device is lost", "see the detail"},
     {FaultCode::planner_late, "F600-planner-late", Action::hold,
      "no command of the mission for more than 500 ms", "the robot stands until commands come again",
-     "none, unless it comes often: lower_case the resolution of the plan"},
+     "none, unless it comes often: lower the resolution of the plan"},
     {FaultCode::no_route, "F601-no-route", Action::note, "no way leads to the next station",
      "the station is dropped, with its reason", "compare the map with the site; open the way"},
     {FaultCode::no_view, "F602-no-view", Action::note, "no place is left that would see enough",
