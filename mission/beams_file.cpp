@@ -56,7 +56,7 @@ FileError damaged(const std::filesystem::path& path, std::string what) {
   return {path, "use", make_error_code(boost::system::errc::bad_message), std::move(what)};
 }
 
-FileError unreadable(const std::filesystem::path& path) {
+FileError unreadable_beams(const std::filesystem::path& path) {
   return {path, "read", {errno, boost::system::system_category()}};
 }
 
@@ -73,7 +73,7 @@ class BeamsFile {
 
   FileResult<Header> header(std::uint64_t checksum) {
     struct stat status {};
-    if (fd_ < 0 || ::fstat(fd_, &status) != 0) return unreadable(path_);
+    if (fd_ < 0 || ::fstat(fd_, &status) != 0) return unreadable_beams(path_);
     Header header;
     if (const auto got = read(&header, sizeof header); !got) return got.error();
     const auto size = static_cast<std::uint64_t>(status.st_size);
@@ -90,7 +90,7 @@ class BeamsFile {
     while (count > 0) {
       const ssize_t got = ::read(fd_, to, count);
       if (got < 0 && errno == EINTR) continue;
-      if (got < 0) return unreadable(path_);
+      if (got < 0) return unreadable_beams(path_);
       if (got == 0) return damaged(path_, "a part of it is missing");
       to += got, count -= static_cast<std::size_t>(got);
     }
