@@ -17,13 +17,12 @@ boost::system::error_code code_of(int result, int system) {
     case SQLITE_FULL:
       return make_error_code(errc::no_space_on_device);
     case SQLITE_BUSY:
-    case SQLITE_LOCKED:
       return make_error_code(errc::device_or_resource_busy);
+    case SQLITE_NOMEM:
+      return make_error_code(errc::not_enough_memory);
     case SQLITE_CORRUPT:
     case SQLITE_NOTADB:
       return make_error_code(errc::bad_message);
-    case SQLITE_READONLY:
-      return make_error_code(errc::read_only_file_system);
     default:
       break;
   }
@@ -39,11 +38,11 @@ Statement prepared(sqlite3* db, const char* sql, int& result) {
   return {raw, &sqlite3_finalize};
 }
 
+// As it is stored: nothing is allocated that could be missing. No text is null.
 std::string text_at(sqlite3_stmt* row, int column) {
-  const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(row, column));
-  return text == nullptr
-             ? std::string()
-             : std::string(text, static_cast<std::size_t>(sqlite3_column_bytes(row, column)));
+  const auto* bytes = static_cast<const char*>(sqlite3_column_blob(row, column));
+  return std::string(
+      std::string_view(bytes, static_cast<std::size_t>(sqlite3_column_bytes(row, column))));
 }
 
 void bind_text(sqlite3_stmt* to, int place, const std::string& text) {
@@ -70,6 +69,9 @@ FileResult<JournalFile> JournalFile::open(const std::filesystem::path& path) {
                       SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, nullptr);
   JournalFile file(path, std::unique_ptr<sqlite3, Close>(raw));
   if (result != SQLITE_OK) return file.error("open", result);
+  // SQLite would open it for reading, and then fail to lock it.
+  if (sqlite3_db_readonly(raw, "main") == 1)
+    return FileError{path, "write", make_error_code(errc::read_only_file_system)};
   sqlite3_extended_result_codes(raw, 1);
   const auto ready = file.prepare();
   if (!ready) return ready.error();

@@ -60,8 +60,7 @@ ConsoleFacts RobotConsole::facts() const {
   facts.orders = parts_.survey.orders().text();
   facts.pose = parts_.survey.pilot().pose();
   facts.sigma_m = worse_sigma_m(parts_.survey.pilot().covariance());
-  facts.faults =
-      faults_now(parts_.drivers, parts_.link_troubles, gate, parts_.survey.disk());
+  facts.faults = faults_now(parts_.drivers, parts_.link_troubles, gate, parts_.survey.disk());
   return facts;
 }
 

@@ -97,13 +97,16 @@ std::string objection(const fs::path& folder) {
 FileResult<RunStore> RunStore::open(const fs::path& folder) {
   if (std::string why = objection(folder); !why.empty()) return refused(folder, std::move(why));
   std::error_code error;
-  fs::create_directories(folder / "scans", error);
-  if (error) return FileError{folder / "scans", "make", error};
+  fs::create_directories(folder, error);
+  if (error) return FileError{folder, "make", error};
   RunStore store;
   store.folder_ = folder;
   const fs::path decisions = folder / kDecisions;
   const bool earlier = fs::exists(decisions, error);
+  // By its decisions a folder is one of ours, also if this is cut right here: before anything else.
   if (const auto locked = store.lock(); !locked) return locked.error();
+  fs::create_directories(folder / "scans", error);
+  if (error) return FileError{folder / "scans", "make", error};
   const auto removed = remove_all(products_in(folder));
   if (!removed) return removed.error();
   if (file_calls().ftruncate(store.decisions_fd_, 0) != 0) return failed(decisions, "empty");

@@ -105,7 +105,142 @@ TEST_F(JournalTest, RefusesOtherDatabasesAndLaterVersions) {
   EXPECT_EQ(JournalFile::open(path_).error().code, errc::not_supported);
   change("PRAGMA user_version=1; INSERT INTO events VALUES (7, 0, 'scan', '')");
   EXPECT_EQ(JournalFile::open(path_).error().code, errc::bad_message) << "events are missing";
+  change(
+      "DELETE FROM events; PRAGMA writable_schema=ON;"
+      "UPDATE sqlite_master SET sql = replace(sql, 'text TEXT NOT NULL', 'text TEXT')");
+  change(
+      "INSERT INTO events VALUES (1, 0, 'scan', NULL); PRAGMA writable_schema=ON;"
+      "UPDATE sqlite_master SET sql = replace(sql, 'text TEXT', 'text TEXT NOT NULL')");
+  EXPECT_THAT(JournalFile::open(path_).error().text(), testing::HasSubstr("it is damaged"))
+      << "an event without text";
 }
+
+TEST_F(JournalTest, RefusesWhatOnlyCallsItselfAJournal) {
+  sqlite3* db = nullptr;
+  ASSERT_EQ(sqlite3_open(path_.c_str(), &db), SQLITE_OK);
+  ASSERT_EQ(sqlite3_exec(db, "PRAGMA user_version=1", nullptr, nullptr, nullptr), SQLITE_OK);
+  EXPECT_EQ(JournalFile::open(path_).error().code, errc::bad_message) << "of another program";
+  const std::string ours = "PRAGMA application_id=" + std::to_string(0x56544A31);
+  ASSERT_EQ(sqlite3_exec(db, ours.c_str(), nullptr, nullptr, nullptr), SQLITE_OK);
+  sqlite3_close(db);
+  EXPECT_THAT(JournalFile::open(path_).error().text(), testing::HasSubstr("no such table"));
+}
+
+// To whom files that may not be written are closed; root opens everything.
+class NotRoot {
+ public:
+  NotRoot() {
+    if (was_ == 0) EXPECT_EQ(seteuid(65534), 0);
+  }
+  ~NotRoot() { EXPECT_EQ(seteuid(was_), 0); }
+
+ private:
+  const uid_t was_ = geteuid();
+};
+
+TEST_F(JournalTest, SaysThatItMayOnlyBeRead) {
+  using std::filesystem::perms;
+  (void)file();
+  std::filesystem::permissions(path_, perms::owner_read | perms::group_read | perms::others_read);
+  std::filesystem::permissions(folder_.path(), perms::all);
+  const NotRoot not_root;
+  const auto opened = JournalFile::open(path_);
+  ASSERT_FALSE(opened);
+  EXPECT_EQ(opened.error().code, errc::read_only_file_system) << opened.error().text();
+}
+
+// SQLite's memory, of which one piece is refused. No database may be open at its begin or end.
+class FailingMemory {
+ public:
+  FailingMemory() {
+    sqlite3_shutdown();
+    sqlite3_config(SQLITE_CONFIG_GETMALLOC, &real_);
+    sqlite3_mem_methods failing = real_;
+    failing.xMalloc = [](int size) { return is_refused() ? nullptr : real_.xMalloc(size); };
+    failing.xRealloc = [](void* old, int size) {
+      return is_refused() ? nullptr : real_.xRealloc(old, size);
+    };
+    sqlite3_config(SQLITE_CONFIG_MALLOC, &failing);
+    sqlite3_config(SQLITE_CONFIG_LOOKASIDE, 0, 0);  // Every piece, however small.
+    sqlite3_initialize();
+  }
+  ~FailingMemory() {
+    sqlite3_shutdown();
+    sqlite3_config(SQLITE_CONFIG_MALLOC, &real_);
+    sqlite3_config(SQLITE_CONFIG_LOOKASIDE, 1200, 40);
+    sqlite3_initialize();
+  }
+  void refuse(int piece) { left_ = piece; }  // From 1; 0: none.
+  bool refused() const { return left_ == 0; }
+
+ private:
+  static bool is_refused() { return left_ > 0 && --left_ == 0; }
+  static inline sqlite3_mem_methods real_{};
+  static inline int left_ = 0;
+};
+
+// Where writing costs nothing, as it is done thousands of times.
+std::filesystem::path quick_folder() {
+  return std::filesystem::is_directory("/dev/shm") ? "/dev/shm"
+                                                   : std::filesystem::temp_directory_path();
+}
+
+class WithoutMemory : public JournalTest, public testing::WithParamInterface<bool> {
+ protected:
+  WithoutMemory() { path_ = quick_.path() / "journal.sqlite"; }
+
+  test::TempFolder quick_{quick_folder()};
+  FailingMemory memory_;
+  std::vector<JournalEvent> kept_;
+
+  void begin() {
+    for (const char* more : {"", "-wal", "-journal"})
+      std::filesystem::remove(path_.string() + more);
+    if (GetParam()) std::filesystem::copy_file(quick_.path() / "before.sqlite", path_);
+  }
+  // An error, or what is there. Whatever was acknowledged is in kept_.
+  void use() {
+    auto opened = JournalFile::open(path_);
+    if (!opened) return is_named(opened.error());
+    std::vector<JournalEvent> more = some(2);
+    const auto appended = opened->append(more);
+    if (appended) kept_.insert(kept_.end(), more.begin(), more.end());
+    if (!appended) is_named(appended.error());
+    const auto events = opened->read();
+    if (!events) return is_named(events.error());
+    EXPECT_EQ(*events, kept_);
+  }
+  static void is_named(const mission::FileError& error) {
+    EXPECT_THAT(error.text(), testing::HasSubstr("cannot "));
+    EXPECT_EQ(error.code, errc::not_enough_memory) << error.text();
+  }
+};
+
+TEST_P(WithoutMemory, NamesItAndKeepsWhatItAcknowledged) {
+  std::vector<JournalEvent> before = some(3);
+  if (GetParam()) {
+    path_ = quick_.path() / "before.sqlite";
+    ASSERT_TRUE(file().append(before));
+    path_ = quick_.path() / "journal.sqlite";
+  } else {
+    before.clear();
+  }
+  int piece = 1;
+  for (bool refused = true; refused; ++piece) {
+    SCOPED_TRACE(piece);
+    begin();
+    kept_ = before;
+    memory_.refuse(piece);
+    use();
+    refused = memory_.refused();
+    memory_.refuse(0);
+    ASSERT_EQ(file().read().value(), kept_);
+  }
+  EXPECT_GT(piece, 100);
+}
+INSTANTIATE_TEST_SUITE_P(Of, WithoutMemory, testing::Bool(), [](const auto& param) {
+  return std::string(param.param ? "AFileThatIsThere" : "ANewFile");
+});
 
 TEST_F(JournalTest, NamesAFolderThatIsNotThere) {
   const auto opened = JournalFile::open(folder_.path() / "no" / "journal.sqlite");
@@ -217,6 +352,18 @@ TEST_F(Writing, SharesACommitAmongWhatComesTogetherWithinItsBound) {
   std::ranges::sort(numbers);
   for (std::size_t i = 0; i < numbers.size(); ++i)
     ASSERT_EQ(numbers[i], static_cast<std::int64_t>(i) + 1);
+}
+
+TEST_F(Writing, ForgetsTheNewestOfWhatIsOnlyToldWhenTooMuchWaits) {
+  make();
+  for (std::size_t i = 0; i < Journal::kToldMax + 10; ++i) journal->tell("place", "{}");
+  const auto last = journal->append_now("end", "{}");
+  ASSERT_TRUE(last) << last.error().text();
+  journal.reset();
+  const auto events = file().read().value();
+  ASSERT_EQ(events.size(), Journal::kToldMax + 1) << "all that waited, and then the end";
+  EXPECT_EQ(events.front().kind, "place");
+  EXPECT_EQ(events.back().kind, "end");
 }
 
 TEST_F(Writing, WaitsForADiskThatIsFullAndWritesAllOfItInItsOrder) {

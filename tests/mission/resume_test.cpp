@@ -138,6 +138,19 @@ TEST(Resume, TheProductsAreThoseOfARunThatWasNotCut) {
   EXPECT_FALSE(mission::find_left_run(cut.out()).value()) << "it is finished";
 }
 
+TEST(Resume, ARunThatIsKilledAsItBeginsIsBegunAnew) {
+  const Crossing site;
+  ASSERT_TRUE(site.run_until_killed(false, [] {
+    static Killer killer("decisions.jsonl");
+    mission::set_file_calls(&killer);
+  }));
+  ASSERT_TRUE(fs::exists(site.out()));
+  EXPECT_FALSE(mission::find_left_run(site.out()).value());
+  const RunOutcome again = site.run(false);
+  EXPECT_EQ(again.failure, "");
+  EXPECT_TRUE(again.record.completed);
+}
+
 TEST(Resume, TheJournalIsTheSameForTheSameSeed) {
   const Crossing one, two;
   ASSERT_EQ(one.run(false).failure, "");
