@@ -163,9 +163,9 @@ constexpr Scheme kSchemes[] = {
     {"modbus-rtu", "modbus-rtu:/dev/ttyUSB0@9600N/1", parse_modbus_rtu},
 };
 
-std::string text_of(const SerialLine& line) {
-  return line.path + "@" + std::to_string(line.baud) + line.parity +
-         (line.stop_bits == 2 ? "2" : "");
+std::string text_of(const SerialLine& line, std::string_view usual) {
+  const std::string frame = line.parity + std::string(line.stop_bits == 2 ? "2" : "");
+  return line.path + "@" + std::to_string(line.baud) + (frame == usual ? "" : frame);
 }
 std::string text_of(const std::string& host, std::uint16_t port) {
   return (host.find(':') == std::string::npos ? host : "[" + host + "]") + ":" +
@@ -178,7 +178,7 @@ struct Writer {
     return "gs_usb:" + a.serial + "/" + std::to_string(a.channel) + "@" +
            std::to_string(a.bit_rate_bps);
   }
-  std::string operator()(const SerialAddress& a) const { return "serial:" + text_of(a.line); }
+  std::string operator()(const SerialAddress& a) const { return "serial:" + text_of(a.line, "N"); }
   std::string operator()(const TcpAddress& a) const { return "tcp:" + text_of(a.host, a.port); }
   std::string operator()(const UdpAddress& a) const {
     return "udp:" + std::to_string(a.port) + (a.from.empty() ? "" : "@" + a.from);
@@ -187,7 +187,7 @@ struct Writer {
     return "modbus-tcp:" + text_of(a.host, a.port) + "/" + std::to_string(a.unit);
   }
   std::string operator()(const ModbusRtuAddress& a) const {
-    return "modbus-rtu:" + text_of(a.line) + "/" + std::to_string(a.unit);
+    return "modbus-rtu:" + text_of(a.line, "") + "/" + std::to_string(a.unit);
   }
 };
 

@@ -106,6 +106,15 @@ hal::Task<hal::Result<std::size_t>> SerialPort::read_some(std::span<std::uint8_t
   return State::read_some(state_, into);
 }
 
+hal::Result<void> SerialPort::set_baud(int baud) {
+  const auto& port = state_->stream();
+  if (!port) return boost::system::errc::make_error_code(boost::system::errc::not_connected);
+  SerialLine line = line_;
+  line.baud = static_cast<std::uint32_t>(baud);
+  if (const error_code error = apply_settings(port->native_handle(), line)) return error;
+  return {};
+}
+
 std::vector<Trouble> SerialPort::troubles() const {
   const auto& trouble = state_->trouble();
   return trouble ? std::vector{*trouble} : std::vector<Trouble>{};

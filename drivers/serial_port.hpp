@@ -27,6 +27,11 @@ class SerialPort final : public hal::ByteStream, public Link {
   hal::Task<hal::Result<void>> write(std::span<const std::uint8_t> bytes) override;
   hal::Task<hal::Result<std::size_t>> read_some(std::span<std::uint8_t> into) override;
 
+  // Holds until the port is opened again, which is at the line's own rate. What was unread is gone.
+  // Fails with errc::not_connected while it is lost, errc::invalid_argument for a rate that it does
+  // not take, else as the system does.
+  hal::Result<void> set_baud(int baud);
+
   std::string address() const override { return to_text(LinkAddress(SerialAddress{line_})); }
   std::vector<Trouble> troubles() const override;
   bool connected() const;

@@ -189,6 +189,39 @@ TEST_F(Troubles, SettingsArriveAtThePort) {
   EXPECT_FALSE(port.errors().has_value()) << "a pseudo terminal does not count";
 }
 
+// A pseudo terminal under `path`: its master's end.
+int make_terminal(const std::string& path) {
+  const int master = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
+  EXPECT_EQ(grantpt(master) + unlockpt(master), 0);
+  char name[64];
+  EXPECT_EQ(ptsname_r(master, name, sizeof name), 0);
+  std::filesystem::remove(path);
+  std::filesystem::create_symlink(name, path);
+  return master;
+}
+
+TEST_F(Troubles, ARateThatIsSetHoldsUntilThePortIsOpenedAgain) {
+  int master = make_terminal(path);
+  drivers::SerialPort port({path, 9600}, executor, loop.clock());
+  pass(50ms);
+  EXPECT_EQ(drivers::speed_of(master), 9600U);
+  EXPECT_TRUE(port.set_baud(19200));
+  EXPECT_EQ(drivers::speed_of(master), 19200U);
+  close(master);
+  loop.run([](drivers::SerialPort& lost) -> hal::Task<void> {
+    std::array<std::uint8_t, 8> buffer;
+    EXPECT_FALSE(co_await lost.read_some(buffer));
+  }(port));
+  const auto set = port.set_baud(38400);
+  ASSERT_TRUE(set.has_error());
+  EXPECT_EQ(set.error(), errc::not_connected);
+  master = make_terminal(path);
+  pass(2s);
+  ASSERT_TRUE(port.connected());
+  EXPECT_EQ(drivers::speed_of(master), 9600U);
+  close(master);
+}
+
 // A pseudo terminal has no parity.
 TEST_F(Troubles, SettingsThatAPortDoesNotTake) {
   drivers::PtyPeer peer(path, executor, loop.clock());
