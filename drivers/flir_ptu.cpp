@@ -1,10 +1,12 @@
 #include "drivers/flir_ptu.hpp"
 
+#include <algorithm>
 #include <array>
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <cmath>
 #include <utility>
 
+#include "drivers/stream_health.hpp"
 #include "drivers/text.hpp"
 
 namespace drivers {
@@ -46,6 +48,8 @@ constexpr Fault kLimit{10, "limit hit", "the pan axis ran against its limit",
 constexpr Fault kHot{11, "too hot", "motor or head above 60 deg C", "let it rest"};
 constexpr Fault kLowVoltage{12, "supply too low", "below 11 V", "check the supply and its cable"};
 
+constexpr const Fault& kWrongBaud = stream_fault::kWrongBaud;
+
 constexpr hal::Duration kComeBack = 10s;
 constexpr hal::Duration kAnswer = 1s;
 constexpr hal::Duration kResetTime = 60s;
@@ -53,13 +57,22 @@ constexpr hal::Duration kPoll = 50ms;
 constexpr hal::Duration kWatchEvery = 5s;
 constexpr hal::Duration kStill = 1500ms;
 constexpr hal::Duration kLateAnswer = 200ms;
+// For an answer at another rate, and the time of these bytes: the question, the echo and refusal of
+// what stood before it, its own echo, a wordy answer.
+constexpr hal::Duration kHail = 250ms;
+constexpr int kHailBytes = 120;
 constexpr int kInARow = 3;
 constexpr int kCleanAgain = 20;
 
 }  // namespace
 
-FlirPtu::FlirPtu(FlirPtuConfig config, hal::Clock& clock, hal::ByteStream& stream)
-    : config_(config), clock_(clock), stream_(stream) {}
+FlirPtu::FlirPtu(FlirPtuConfig config, hal::Clock& clock, hal::ByteStream& stream,
+                 std::optional<SettableLine> line)
+    : config_(config), clock_(clock), stream_(stream), line_(std::move(line)) {
+  if (!line_) return;
+  other_bauds_ = rates_to_try(static_cast<int>(line_->line.baud), kPtuBauds, line_->set_baud);
+  other_bauds_.erase(other_bauds_.begin());
+}
 
 FlirPtu::~FlirPtu() = default;
 
@@ -73,13 +86,52 @@ hal::Task<void> FlirPtu::run() {
     co_await session();
     state_ = DeviceState::lost;
     changed_.notify();
-    co_await clock_.sleep_for(hal::from_seconds(config_.retry_s));
+    const hal::Time again = clock_.now() + hal::from_seconds(config_.retry_s);
+    // Whoever answered once has this rate, and may have to be heard again in mid-mission.
+    if (unanswered_ && !learned_ && !other_bauds_.empty()) co_await hail_at_other_rates(again);
+    co_await clock_.sleep_until(again);
+  }
+}
+
+// Goes on where it ended the last time, but at a rate at which the unit answered then.
+hal::Task<void> FlirPtu::hail_at_other_rates(hal::Time until) {
+  bool answers = false;
+  for (std::size_t asked = 0; asked < other_bauds_.size() && clock_.now() < until; ++asked) {
+    answers = co_await answers_at(other_bauds_.front());
+    if (answers) break;
+    std::ranges::rotate(other_bauds_, other_bauds_.begin() + 1);
+  }
+  (void)line_->set_baud(static_cast<int>(line_->line.baud));  // Lost: it is opened at this rate.
+  if (!answers) {
+    if (!troubles_.has(kWrongBaud)) co_return;
+    troubles_.clear(kWrongBaud);
+    co_return judge_silence(ptu_hail());
+  }
+  for (const Fault* fault : {&kSilent, &kGarbage}) troubles_.clear(*fault);
+  SerialLine right = line_->line;
+  right.baud = static_cast<std::uint32_t>(other_bauds_.front());
+  troubles_.set(kWrongBaud, "answers at " + std::to_string(right.baud) + " baud, not at " +
+                                std::to_string(line_->line.baud) + ": set link = \"" +
+                                to_text(LinkAddress(SerialAddress{right})) + "\"");
+}
+
+hal::Task<bool> FlirPtu::answers_at(int baud) {
+  if (!line_->set_baud(baud)) co_return false;
+  FrameReader reader(stream_, clock_, look_ptu, kPtuLineMax);
+  const hal::Time deadline = clock_.now() + kHail + hal::from_seconds(10.0 * kHailBytes / baud);
+  const Bytes question = ptu_hail();
+  const auto written = co_await (stream_.write(question) || clock_.sleep_until(deadline));
+  if (const auto* result = std::get_if<0>(&written); result == nullptr || !*result) co_return false;
+  for (;;) {
+    const auto frame = co_await reader.next(deadline);
+    if (!frame) co_return false;
+    if (ptu_hailed(parse_ptu(*frame))) co_return true;
   }
 }
 
 // Ends when the unit is lost; the trouble says why.
 hal::Task<void> FlirPtu::session() {
-  asked_ = lost_ = false;
+  asked_ = lost_ = unanswered_ = false;
   bytes_ = 0;
   resync_ = Resync(kPtuLineMax);
   co_await (receive() || converse());
@@ -147,12 +199,12 @@ hal::Task<bool> FlirPtu::set_up_talk() {
 
 hal::Task<bool> FlirPtu::learn() {
   const auto resolution = co_await exchange(ptu_query("PR"), Expect::number, kAnswer);
-  const auto numbers = resolution ? ptu_numbers(resolution->answer) : std::vector<double>{};
-  if (numbers.size() != 1 || !(numbers[0] > 0.1 && numbers[0] < 3600)) {
+  const auto arcsec = resolution ? ptu_step_arcsec(resolution->answer) : std::nullopt;
+  if (!arcsec) {
     troubles_.set(kGarbage, "it does not say how large its steps are");
     co_return false;
   }
-  axis_ = {numbers[0], config_.counter_clockwise};
+  axis_ = {*arcsec, config_.counter_clockwise};
   if (config_.arcsec_per_step > 0 &&
       std::abs(axis_.arcsec_per_step / config_.arcsec_per_step - 1) > 1e-3) {
     troubles_.set(kOtherModel, "its steps are " + std::to_string(axis_.arcsec_per_step) +
@@ -167,6 +219,7 @@ hal::Task<bool> FlirPtu::learn() {
     *value = *got;
   }
   learned_ = true;
+  troubles_.clear(kWrongBaud);
   identity_.maker = "FLIR";
   identity_.model = "PTU with " + std::to_string(axis_.arcsec_per_step) + " arc seconds a step";
   const auto version = co_await exchange(ptu_query("V"), Expect::anything, kAnswer);
@@ -284,6 +337,8 @@ hal::Task<hal::Result<FlirPtu::Exchange>> FlirPtu::ask_once(const Bytes& request
 
 void FlirPtu::judge_silence(const Bytes& request) {
   if (troubles_.has(kUnplugged)) return;
+  unanswered_ = true;
+  if (troubles_.has(kWrongBaud)) return;
   const bool garbage = resync_.skipped().contains("not text");
   troubles_.clear(garbage ? kSilent : kGarbage);
   troubles_.set(garbage ? kGarbage : kSilent,

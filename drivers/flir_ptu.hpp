@@ -6,6 +6,7 @@
 #include <string>
 
 #include "drivers/device.hpp"
+#include "drivers/port_search.hpp"
 #include "drivers/ptu_codec.hpp"
 #include "drivers/resync.hpp"
 #include "drivers/signal.hpp"
@@ -28,12 +29,17 @@ struct FlirPtuConfig {
   double retry_s = 1;    // From losing the unit to trying again.
 };
 
+// Until the unit answers for the first time, it is also asked at the other rates of a settable
+// line, in the pauses between two starts: a trouble then says at which one it answers. It is used
+// at the line's own rate only.
+//
 // Sends one request at a time. While it is lost, calls wait up to 10 s for it and then fail with
 // errc::not_connected.
 class FlirPtu final : public hal::PanUnit, public Device {
  public:
   // The clock and the stream must outlive it.
-  FlirPtu(FlirPtuConfig config, hal::Clock& clock, hal::ByteStream& stream);
+  FlirPtu(FlirPtuConfig config, hal::Clock& clock, hal::ByteStream& stream,
+          std::optional<SettableLine> line = {});
   ~FlirPtu() override;
 
   // Also fails with errc::timed_out when it does not get there.
@@ -60,6 +66,8 @@ class FlirPtu final : public hal::PanUnit, public Device {
   enum class Expect { number, nothing, anything };
 
   hal::Task<void> session();
+  hal::Task<void> hail_at_other_rates(hal::Time until);
+  hal::Task<bool> answers_at(int baud);
   hal::Task<void> receive();
   hal::Task<void> converse();
   hal::Task<bool> bring_up();
@@ -84,6 +92,8 @@ class FlirPtu final : public hal::PanUnit, public Device {
   const FlirPtuConfig config_;
   hal::Clock& clock_;
   hal::ByteStream& stream_;
+  const std::optional<SettableLine> line_;
+  std::vector<int> other_bauds_;  // Next first.
 
   DeviceState state_ = DeviceState::off;
   Identity identity_;
@@ -93,7 +103,7 @@ class FlirPtu final : public hal::PanUnit, public Device {
   Turns turns_;
   Signal answered_, changed_;
   std::optional<Exchange> answer_;
-  bool asked_{}, unsure_{}, lost_{}, resetting_{};
+  bool asked_{}, unsure_{}, lost_{}, resetting_{}, unanswered_{};
   std::uint64_t bytes_{};
   int late_{}, in_step_{};
 

@@ -6,8 +6,15 @@
 #include <vector>
 
 #include "drivers/frame_reader.hpp"
+#include "drivers/link_address.hpp"
 
 namespace drivers {
+
+// A serial line whose rate can be set; `line` is as its robot file says.
+struct SettableLine {
+  SerialLine line;
+  SetBaud set_baud;
+};
 
 enum class Found : std::uint8_t { nothing, other, ours };
 

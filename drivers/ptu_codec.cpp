@@ -156,6 +156,20 @@ std::optional<PtuHealth> ptu_health(const PtuAnswer& answer) {
   return PtuHealth{numbers[0], celsius(1), celsius(2), celsius(3)};
 }
 
+Bytes ptu_hail() {
+  return ptu_query(" PR");
+}
+
+bool ptu_hailed(const PtuAnswer& answer) {
+  return (answer.echo.empty() || answer.echo.ends_with("PR")) && ptu_step_arcsec(answer);
+}
+
+std::optional<double> ptu_step_arcsec(const PtuAnswer& answer) {
+  const auto numbers = ptu_numbers(answer);
+  if (numbers.size() != 1 || !(numbers[0] > 0.1 && numbers[0] < 3600)) return std::nullopt;
+  return numbers[0];
+}
+
 const Fault* ptu_fault(const PtuAnswer& answer) {
   if (answer.ok || answer.text.empty()) return nullptr;
   if (answer.text.find("Illegal") != std::string::npos) return &kIllegal;

@@ -56,6 +56,17 @@ struct PtuHealth {
 };
 std::optional<PtuHealth> ptu_health(const PtuAnswer& answer);
 
+// Of the rates from 600 baud on that a serial line can be set to, the likeliest first.
+inline constexpr int kPtuBauds[] = {9600, 19200, 38400, 57600, 115200, 4800, 2400, 1200, 600};
+
+// Asks, at a rate that may not be the unit's, what changes nothing: how large its steps are. Ends
+// half a command first.
+Bytes ptu_hail();
+// Whether it is a unit that answers that, and not another device's line.
+bool ptu_hailed(const PtuAnswer& answer);
+// The arc seconds that PR or TR answer; nothing for what no unit has.
+std::optional<double> ptu_step_arcsec(const PtuAnswer& answer);
+
 // Null for answers that are no refusal.
 const Fault* ptu_fault(const PtuAnswer& answer);
 

@@ -5,7 +5,6 @@
 #include <variant>
 
 #include "drivers/link_address.hpp"
-#include "drivers/serial_port.hpp"
 #include "drivers/socketcan.hpp"
 #include "drivers/tcp_stream.hpp"
 #include "drivers/udp_port.hpp"
@@ -121,7 +120,7 @@ HardwareLinks::HardwareLinks(const RobotConfig& config,
   ends_.drive = open_can("drive", config.drive.link);
   if (needs_pan(config.scanner)) {
     ends_.scanner = open_stream("scanner", config.scanner.link);
-    ends_.pan = open_stream("pan", config.pan.link);
+    open_pan(config.pan.link);
   } else {
     ends_.packets = open_datagrams("scanner", config.scanner.link);
     if (asks_ouster(config.scanner)) open_scanner_api(config.scanner.api_link);
@@ -164,13 +163,29 @@ hal::CanBus* HardwareLinks::open_can(const std::string& role, const std::string&
 
 hal::ByteStream* HardwareLinks::open_stream(const std::string& role, const std::string& address) {
   const drivers::LinkAddress at = parsed(address);
-  if (const auto* serial = std::get_if<drivers::SerialAddress>(&at)) {
-    auto port = std::make_shared<drivers::SerialPort>(serial->line, executor_, clock_);
-    owned_.push_back(port);
-    named_.push_back({role, port.get()});
-    return port.get();
-  }
+  if (const auto* serial = std::get_if<drivers::SerialAddress>(&at))
+    return &open_serial(role, serial->line);
   return &open_tcp(role, address);
+}
+
+drivers::SerialPort& HardwareLinks::open_serial(const std::string& role,
+                                                const drivers::SerialLine& line) {
+  auto port = std::make_shared<drivers::SerialPort>(line, executor_, clock_);
+  owned_.push_back(port);
+  named_.push_back({role, port.get()});
+  return *port;
+}
+
+void HardwareLinks::open_pan(const std::string& address) {
+  const drivers::LinkAddress at = parsed(address);
+  const auto* serial = std::get_if<drivers::SerialAddress>(&at);
+  if (serial == nullptr) {
+    ends_.pan = &open_tcp("pan", address);
+    return;
+  }
+  drivers::SerialPort& port = open_serial("pan", serial->line);
+  ends_.pan = &port;
+  ends_.pan_line = {serial->line, [&port](int baud) { return port.set_baud(baud); }};
 }
 
 drivers::TcpStream& HardwareLinks::open_tcp(const std::string& role, const std::string& address) {

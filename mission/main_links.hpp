@@ -11,6 +11,7 @@
 #include "drivers/gs_usb.hpp"
 #include "drivers/link_trouble.hpp"
 #include "drivers/modbus_client.hpp"
+#include "drivers/serial_port.hpp"
 #include "drivers/tcp_stream.hpp"
 #include "mission/config.hpp"
 #include "mission/main_robot.hpp"
@@ -41,6 +42,8 @@ class HardwareLinks {
  private:
   hal::CanBus* open_can(const std::string& role, const std::string& address);
   hal::ByteStream* open_stream(const std::string& role, const std::string& address);
+  drivers::SerialPort& open_serial(const std::string& role, const drivers::SerialLine& line);
+  void open_pan(const std::string& address);
   drivers::TcpStream& open_tcp(const std::string& role, const std::string& address);
   void open_scanner_api(const std::string& address);
   void open_corrections(const CorrectionsConfig& config);

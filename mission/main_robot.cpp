@@ -155,8 +155,8 @@ void RobotDrivers::add_sweep(const RobotConfig& config, const Links& links,
   ptu.angle_max_rad = hal::radians(config.pan.angle_max_deg);
   ptu.angle_min_rad = -ptu.angle_max_rad;
   ptu.acceleration_radps2 = kPanAcceleration_radps2;
-  auto& pan =
-      own("pan", config.pan.link, std::make_unique<drivers::FlirPtu>(ptu, clock_, *links.pan));
+  auto& pan = own("pan", config.pan.link,
+                  std::make_unique<drivers::FlirPtu>(ptu, clock_, *links.pan, links.pan_line));
   drivers::SweepScannerConfig sweep;
   sweep.mount = mount_of(config.scanner);
   sweep.field = field_of(config.scanner);

@@ -12,6 +12,7 @@
 #include "drivers/device.hpp"
 #include "drivers/gnss_output.hpp"
 #include "drivers/ouster.hpp"
+#include "drivers/port_search.hpp"
 #include "drivers/power_io.hpp"
 #include "drivers/site_frame.hpp"
 #include "drivers/sweep_scanner.hpp"
@@ -44,6 +45,8 @@ class RobotDrivers {
   struct Links {
     hal::CanBus* drive{};
     hal::ByteStream *scanner{}, *pan{}, *imu{}, *gnss{};
+    // Of a pan unit on a serial port.
+    std::optional<drivers::SettableLine> pan_line{};
     hal::ByteStream* obstacles{};    // Null where the robot has none.
     hal::ByteStream* scanner_api{};  // Where an Ouster serves its settings; null: nowhere.
     std::function<void()> drop_scanner_api{};

@@ -134,8 +134,16 @@ struct Site : DriveBench {
     T& made = unit<T>(std::forward<Arguments>(arguments)...);
     device = &made;
   }
+  // Of a line whose unit's end is `uart`.
+  drivers::SettableLine settable(sim::Uart& uart) {
+    return {{"/dev/ttyUSB0", static_cast<std::uint32_t>(uart.host_baud())},
+            [&uart](int baud) -> hal::Result<void> {
+              uart.set_host_baud(baud);
+              return {};
+            }};
+  }
   // The unit's end of a serial line whose other end is set to another rate.
-  hal::ByteStream& at(int unit_baud, int host_baud) {
+  sim::Uart& at(int unit_baud, int host_baud) {
     sim::Uart& uart = own<sim::Uart>(line.b(), unit_baud);
     uart.set_host_baud(host_baud);
     return uart;
@@ -317,6 +325,14 @@ const std::vector<Wrong>& all_wrongs() {
        [](Site& s) { s.drive_with<drivers::Hokuyo>(drivers::HokuyoConfig{}, s.clock, s.line.a()); },
        "no answer", "TCP port 10940"},
       {"FlirPtu", "Baud",
+       [](Site& s) {
+         sim::Uart& uart = s.at(9600, 19200);
+         s.unit<sim::FlirPtuUnit>(sim::FlirPtuUnitConfig{}, s.clock, uart, s.faults);
+         s.drive_with<drivers::FlirPtu>(drivers::FlirPtuConfig{}, s.clock, s.line.a(),
+                                        s.settable(uart));
+       },
+       "not understood", "set the bit rate of the robot file"},
+      {"FlirPtu", "BaudOfAServerInBetween",
        [](Site& s) {
          s.unit<sim::FlirPtuUnit>(sim::FlirPtuUnitConfig{}, s.clock, s.at(9600, 19200), s.faults);
          s.drive_with<drivers::FlirPtu>(drivers::FlirPtuConfig{}, s.clock, s.line.a());

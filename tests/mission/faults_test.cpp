@@ -152,6 +152,7 @@ TEST(Faults, AreHeldForWhatNobodyForesaw) {
   EXPECT_EQ(mission::fault_of("scanner", "no answer"), FaultCode::scanner_silent);
   EXPECT_EQ(mission::fault_of("power", "no answer"), FaultCode::power_silent);
   EXPECT_EQ(mission::fault_of("link", "no answer"), FaultCode::link_unreachable);
+  EXPECT_EQ(mission::fault_of("pan", "not understood"), FaultCode::pan_other_device);
 }
 
 // --- Order.

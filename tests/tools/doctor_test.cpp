@@ -231,8 +231,8 @@ TEST_P(WrongWiring, IsNamedWithItsRemedy) {
 
 INSTANTIATE_TEST_SUITE_P(
     Doctor, WrongWiring,
-    testing::Values(Wrong{"BaudOfThePanUnit", "pan", "pan", "link", "@19200", "no answer",
-                          "on a serial line at 9600 baud"},
+    testing::Values(Wrong{"BaudOfThePanUnit", "pan", "pan", "link", "@19200", "not understood",
+                          "set the bit rate of the robot file"},
                     Wrong{"BaudOfTheImu", "imu", "imu", "link", "@57600", "not understood",
                           "set the bit rate of the robot file"},
                     Wrong{"BaudOfTheReceiver", "gnss", "gnss", "link", "@4800", "not understood",
@@ -249,6 +249,34 @@ INSTANTIATE_TEST_SUITE_P(
                     Wrong{"ReceiverWhereGpsdIsNamed", "gnss", "gnss", "device", "gpsd",
                           "another device", "the model in the robot file"}),
     [](const auto& param) { return std::string(param.param.name); });
+
+// And what to write instead, which helps.
+TEST_F(DoctorTest, SaysAtWhichRateAPanUnitAnswers) {
+  start_units("pan none");
+  std::string robot = test::read_text(robot_);
+  const std::string right = folder_.path().string() + "/ports/pan@9600";
+  const std::string wrong = folder_.path().string() + "/ports/pan@115200";
+  robot.replace(robot.find(right), right.size(), wrong);
+  robot_ = write("wrong.toml", robot);
+  auto devices = diagnose("9");
+  EXPECT_EQ(names(devices["pan"]), "not understood; ");
+  const auto& troubles = devices["pan"].at("troubles").as_array();
+  ASSERT_EQ(troubles.size(), 1U);
+  const std::string said(troubles[0].at("detail").as_string());
+  const std::string before = "answers at 9600 baud, not at 115200: set link = \"";
+  ASSERT_TRUE(said.starts_with(before)) << said;
+  const std::string link = said.substr(before.size(), said.size() - before.size() - 1);
+  robot.replace(robot.find("serial:" + wrong), 7 + wrong.size(), link);
+  robot_ = write("right.toml", robot);
+  devices = diagnose("9");
+  EXPECT_TRUE(devices["pan"].at("healthy").as_bool()) << names(devices["pan"]);
+}
+
+TEST_F(DoctorTest, APanUnitWithoutPowerDoesNotAnswer) {
+  start_units("pan off");
+  const auto devices = diagnose("9");
+  EXPECT_EQ(names(devices.at("pan")), "no answer; ");
+}
 
 // As a user who is not in the port's group.
 TEST_F(DoctorTest, NamesTheGroupThatMayOpenAPort) {
