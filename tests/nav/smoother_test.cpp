@@ -19,7 +19,7 @@
 namespace {
 
 using hal::kDeg;
-constexpr double kWheels_s = 0.1;
+constexpr double kWheelPeriod_s = 0.1;
 const std::array<Eigen::Vector2d, 4> kMasts{{{-20, -15}, {25, -12}, {18, 22}, {-15, 25}}};
 
 hal::Time moment(double time_s) {
@@ -70,7 +70,7 @@ BendyDrive bendy_drive(support::Dice& dice, int ticks) {
                                         dice.gauss(std::hypot(bumps_m, slide_m)));
     truth.heading_rad += turned_rad;
     drive.truth.push_back(truth);
-    drive.events.emplace_back(hal::WheelTravel{moment(i * kWheels_s), left_m, right_m});
+    drive.events.emplace_back(hal::WheelTravel{moment(i * kWheelPeriod_s), left_m, right_m});
   }
   return drive;
 }
@@ -159,9 +159,9 @@ Claims sightings_judged(double wander_s) {
         const Eigen::Vector2d way = kMasts[mast] - drive.truth[i].position_m;
         events.emplace_back(nav::LandmarkSighting{
             nav::stamp_of(drive.events[i]), kMasts[mast],
-            way.norm() + ranges[mast].after(3 * kWheels_s, dice),
+            way.norm() + ranges[mast].after(3 * kWheelPeriod_s, dice),
             hal::wrapped(std::atan2(way.y(), way.x()) - drive.truth[i].heading_rad +
-                         bearings[mast].after(3 * kWheels_s, dice)),
+                         bearings[mast].after(3 * kWheelPeriod_s, dice)),
             0.3, 0.03});
       }
     }
