@@ -39,10 +39,11 @@ class Recorder final : public hal::Scanner {
   std::vector<hal::ScanCloud> taken_;
 };
 
-// A mission on that site, and the survey as it stands at its end.
-class LyingMission {
+// A mission on the small crossing whose scans are kept, and the survey as it stands at its end.
+// Calls of the scanner in `lies` (from 1) are turned.
+class RecordedMission {
  public:
-  explicit LyingMission(std::set<int> lies = {}, int views_max = 2)
+  explicit RecordedMission(std::set<int> lies = {}, int views_max = 2)
       : site_(mission_test::kQuickRobot, views_max),
         ready_(mission_test::crossing(site_)),
         backend_(ready_.config, ready_.tasks, std::move(ready_.sim), 1),
@@ -109,7 +110,7 @@ class LyingMission {
 };
 
 TEST(SurveyRegisters, TheMapIsTheOneThatTheCorrectedPosesGive) {
-  const LyingMission mission;
+  const RecordedMission mission;
   const mission::RunRecord& record = mission.record();
   ASSERT_TRUE(record.completed) << record.end;
   ASSERT_GE(record.scans.size(), 4U);
@@ -123,7 +124,7 @@ TEST(SurveyRegisters, TheMapIsTheOneThatTheCorrectedPosesGive) {
 }
 
 TEST(SurveyRegisters, TheFilesHaveTheCorrectedPoses) {
-  const LyingMission mission;
+  const RecordedMission mission;
   for (const mission::ScanRecord& scan : mission.record().scans) {
     const auto file = mission::read_ply(mission.folder() / "scans" /
                                         ("000" + std::to_string(scan.number) + ".ply"));
@@ -134,7 +135,7 @@ TEST(SurveyRegisters, TheFilesHaveTheCorrectedPoses) {
 }
 
 TEST(SurveyRegisters, EveryDecisionIsOnOneLineWithItsFigures) {
-  const LyingMission mission;
+  const RecordedMission mission;
   const auto registered = mission.decisions("registration");
   ASSERT_GE(registered.size(), mission.record().scans.size());
   EXPECT_EQ(registered.front().at("verdict").as_string(), "overlaps none");
@@ -153,7 +154,7 @@ TEST(SurveyRegisters, EveryDecisionIsOnOneLineWithItsFigures) {
 
 // The first that is laid over others when all goes well: its number.
 int first_accepted() {
-  const LyingMission mission;
+  const RecordedMission mission;
   for (const mission::ScanRecord& scan : mission.record().scans)
     if (scan.fit.verdict == ScanVerdict::accepted) return scan.number;
   ADD_FAILURE() << "none is accepted";
@@ -162,7 +163,7 @@ int first_accepted() {
 
 TEST(SurveyRegisters, AScanThatContradictsTheOthersIsTakenAgain) {
   const int number = first_accepted();
-  const LyingMission mission({number});
+  const RecordedMission mission({number});
   const mission::RunRecord& record = mission.record();
   ASSERT_TRUE(record.completed) << record.end;
   EXPECT_EQ(record.registration.retaken, 1);
@@ -174,7 +175,7 @@ TEST(SurveyRegisters, AScanThatContradictsTheOthersIsTakenAgain) {
 
 TEST(SurveyRegisters, AScanThatContradictsTheOthersTwiceIsNotMerged) {
   const int number = first_accepted();
-  const LyingMission mission({number, number + 1});
+  const RecordedMission mission({number, number + 1});
   const mission::RunRecord& record = mission.record();
   ASSERT_TRUE(record.completed) << record.end;
   EXPECT_EQ(record.registration.retaken, 1);
