@@ -11,6 +11,7 @@
 #include "mission/plan.hpp"
 #include "mission/site_io.hpp"
 #include "nav/polygons.hpp"
+#include "nav/segment_distance.hpp"
 #include "planning/tour.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -18,10 +19,6 @@ namespace fort_tour_tests {
 namespace {
 
 using Eigen::Vector2d;
-
-double cross(const Vector2d& a, const Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
 
 class VisibilityGraph {
  public:
@@ -76,10 +73,10 @@ class VisibilityGraph {
       if (edge.a.x() > high.x() && edge.b.x() > high.x()) continue;
       if (edge.a.y() < low.y() && edge.b.y() < low.y()) continue;
       if (edge.a.y() > high.y() && edge.b.y() > high.y()) continue;
-      const double a = cross(way, edge.a - p), b = cross(way, edge.b - p);
+      const double a = nav::cross2(way, edge.a - p), b = nav::cross2(way, edge.b - p);
       if ((a > -slack && b > -slack) || (a < slack && b < slack)) continue;
       const Vector2d along = edge.b - edge.a;
-      const double s = cross(along, p - edge.a), t = cross(along, q - edge.a);
+      const double s = nav::cross2(along, p - edge.a), t = nav::cross2(along, q - edge.a);
       const double own_slack = 0.003 * along.norm();
       if (!((s > -own_slack && t > -own_slack) || (s < own_slack && t < own_slack))) return false;
     }
