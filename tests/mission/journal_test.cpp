@@ -34,6 +34,14 @@ class JournalTest : public testing::Test {
   std::filesystem::path path_ = folder_.path() / "journal.sqlite";
 
   JournalFile file() { return JournalFile::open(path_).value(); }
+  // As another program would. Exclusively: a disk that was traced once has no shared memory.
+  void change(const std::string& sql) const {
+    sqlite3* db = nullptr;
+    ASSERT_EQ(sqlite3_open(path_.c_str(), &db), SQLITE_OK);
+    const std::string all = "PRAGMA locking_mode=EXCLUSIVE;" + sql;
+    EXPECT_EQ(sqlite3_exec(db, all.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sql;
+    sqlite3_close(db);
+  }
   static std::vector<JournalEvent> some(int count) {
     std::vector<JournalEvent> events;
     for (int i = 0; i < count; ++i)
@@ -91,12 +99,6 @@ TEST_F(JournalTest, RefusesWhatIsNoJournalOrDamaged) {
 }
 
 TEST_F(JournalTest, RefusesOtherDatabasesAndLaterVersions) {
-  const auto change = [&](const char* sql) {
-    sqlite3* db = nullptr;
-    ASSERT_EQ(sqlite3_open(path_.c_str(), &db), SQLITE_OK);
-    EXPECT_EQ(sqlite3_exec(db, sql, nullptr, nullptr, nullptr), SQLITE_OK);
-    sqlite3_close(db);
-  };
   change("CREATE TABLE other (x)");
   EXPECT_EQ(JournalFile::open(path_).error().code, errc::bad_message);
   std::filesystem::remove(path_);
@@ -116,13 +118,9 @@ TEST_F(JournalTest, RefusesOtherDatabasesAndLaterVersions) {
 }
 
 TEST_F(JournalTest, RefusesWhatOnlyCallsItselfAJournal) {
-  sqlite3* db = nullptr;
-  ASSERT_EQ(sqlite3_open(path_.c_str(), &db), SQLITE_OK);
-  ASSERT_EQ(sqlite3_exec(db, "PRAGMA user_version=1", nullptr, nullptr, nullptr), SQLITE_OK);
+  change("PRAGMA user_version=1");
   EXPECT_EQ(JournalFile::open(path_).error().code, errc::bad_message) << "of another program";
-  const std::string ours = "PRAGMA application_id=" + std::to_string(0x56544A31);
-  ASSERT_EQ(sqlite3_exec(db, ours.c_str(), nullptr, nullptr, nullptr), SQLITE_OK);
-  sqlite3_close(db);
+  change("PRAGMA application_id=" + std::to_string(0x56544A31));
   EXPECT_THAT(JournalFile::open(path_).error().text(), testing::HasSubstr("no such table"));
 }
 
