@@ -24,13 +24,19 @@ hal::Pose2 start_pose(const SiteTasks& tasks, const RunHistory* past) {
   return past != nullptr && past->where ? past->where->believed : tasks.start;
 }
 
-// A robot that was cut off on its way rolled on a little, and stands somewhere ahead.
+// A robot that was cut off on its way rolled on a little, and stands somewhere ahead. Only driving
+// tells a heading: however often it was cut off, it may drive.
 Eigen::Matrix3d start_covariance(const RunHistory* past) {
   Eigen::Matrix3d covariance = Pilot::start_covariance();
   if (past == nullptr || !past->where) return covariance;
   covariance += past->where->covariance;
   const Eigen::Vector3d cut_off{kCutOffM, kCutOffM, kCutOffRad};
   if (past->left) covariance += Eigen::Matrix3d(cut_off.cwiseAbs2().asDiagonal());
+  const double over = std::sqrt(covariance(2, 2)) / (0.95 * Survey::kHeadingSigmaMaxRad);
+  if (over > 1) {
+    covariance.row(2) /= over;
+    covariance.col(2) /= over;
+  }
   return covariance;
 }
 

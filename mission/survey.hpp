@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "hal/angles.hpp"
 #include "hal/clock.hpp"
 #include "hal/compute.hpp"
 #include "hal/devices.hpp"
@@ -40,6 +41,9 @@ struct CannotGoOn : std::runtime_error {
 
 class Survey {
  public:
+  // 1 sigma of the heading beyond which the robot stands.
+  static constexpr double kHeadingSigmaMaxRad = 15 * hal::kDeg;
+
   // In simulation: where the robot really is, and where its last scan was really taken.
   struct Truths {
     hal::Pose2 robot;

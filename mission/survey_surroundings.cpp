@@ -10,7 +10,6 @@
 namespace mission {
 namespace {
 
-constexpr double kHeadingSigmaMaxRad = 15 * hal::kDeg;
 // The believed pose may be that far outside of what the robot can drive on.
 constexpr double kOutsideMaxM = 0.5;
 constexpr double kLookAgainM = 0.05;

@@ -14,6 +14,7 @@
 #include <random>
 #include <set>
 
+#include "hal/angles.hpp"
 #include "mission/beams_file.hpp"
 #include "tests/mission/killed_run.hpp"
 #include "tests/mission/mission_site.hpp"
@@ -33,7 +34,8 @@ class Crossing {
   fs::path out() const { return site_.out(); }
   fs::path folder() const { return site_.folder(); }
 
-  RunOutcome run(bool resume, const std::vector<std::string>& skip = {}) const {
+  RunOutcome run(bool resume, const std::vector<std::string>& skip = {},
+                 const std::function<void(mission::SimBackend&)>& watch = {}) const {
     mission::Prepared ready = site_.prepared();
     for (const auto& error : ready.errors) ADD_FAILURE() << error.text();
     return mission::run_in_simulation(ready, {.out = out(),
@@ -42,7 +44,8 @@ class Crossing {
                                               .judge_cells = {},
                                               .threads = 1,
                                               .progress = nullptr,
-                                              .terminal = false});
+                                              .terminal = false,
+                                              .watch = watch});
   }
 
   // In a process of its own, which is killed after so long; false: it ended before.
@@ -60,6 +63,26 @@ class Crossing {
   // The same, killed by what `break_it` has set up.
   bool run_until_killed(bool resume, const std::function<void()>& break_it) const {
     const pid_t child = start(resume, break_it);
+    int status = 0;
+    waitpid(child, &status, 0);
+    return ended(status);
+  }
+
+  // The same, killed as it turns round: where it stands, with a scan at least, or as it goes on.
+  bool run_until_killed_turning(bool resume, double turn_rad) const {
+    const pid_t child = fork();
+    if (child == 0) {
+      std::optional<hal::Pose2> stood;
+      (void)run(resume, {}, [&](mission::SimBackend& backend) {
+        const hal::Pose2 pose = backend.world().robot().pose;
+        if (!stood || (!resume && (pose.position_m - stood->position_m).norm() > 0.02))
+          stood = pose;
+        const double turned_rad = hal::wrapped(pose.heading_rad - stood->heading_rad);
+        if (std::abs(turned_rad) > turn_rad && fs::exists(out() / "scans" / "0001.beams"))
+          kill(getpid(), SIGKILL);
+      });
+      _exit(0);
+    }
     int status = 0;
     waitpid(child, &status, 0);
     return ended(status);
@@ -149,6 +172,16 @@ TEST(Resume, ARunThatIsKilledAsItBeginsIsBegunAnew) {
   const RunOutcome again = site.run(false);
   EXPECT_EQ(again.failure, "");
   EXPECT_TRUE(again.record.completed);
+}
+
+// Only driving tells a heading: less sure of it after each cut, the robot would stand for good.
+TEST(Resume, ARunThatIsCutAgainAndAgainAsTheRobotTurnsRoundIsGoneOnWith) {
+  const Crossing site;
+  ASSERT_TRUE(site.run_until_killed_turning(false, 0.5));
+  for (int cut = 0; cut < 2; ++cut) ASSERT_TRUE(site.run_until_killed_turning(true, 0.45)) << cut;
+  const RunOutcome outcome = site.run(true);
+  EXPECT_EQ(outcome.failure, "");
+  EXPECT_TRUE(outcome.record.completed);
 }
 
 TEST(Resume, TheJournalIsTheSameForTheSameSeed) {
