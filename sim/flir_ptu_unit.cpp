@@ -50,9 +50,23 @@ FlirPtuUnit::FlirPtuUnit(FlirPtuUnitConfig config, hal::Clock& clock, hal::ByteS
       dice_(config_.seed) {
   restart();
   ready_ = clock.now();  // It was on before the robot.
+  off_ = faults.is(UnitFault::off);
+  faults_.on_set([this] { look_at_power(); });
 }
 
-FlirPtuUnit::~FlirPtuUnit() = default;
+FlirPtuUnit::~FlirPtuUnit() {
+  faults_.on_set({});
+}
+
+// Not when somebody speaks to it: while it is off, that does not reach it.
+void FlirPtuUnit::look_at_power() {
+  const bool off = faults_.is(UnitFault::off);
+  if (off == off_) return;
+  off_ = off;
+  if (!off) return restart();
+  motion_ = PanMotion::standing(motion_.at(clock_.now()));
+  ++changes_;
+}
 
 double FlirPtuUnit::step_rad() const {
   return config_.arcsec_per_step * std::numbers::pi / 648000;
@@ -77,6 +91,7 @@ void FlirPtuUnit::restart() {
   head_offset_ = target_ = 0;
   ++changes_;
   echo_ = verbose_ = true;
+  half_.clear();
   speed_ = std::llround(0.3 / step_rad());
   acceleration_ = std::llround(config_.acceleration_radps2 / step_rad());
   ready_ = clock_.now() + config_.reset_time;
@@ -84,25 +99,21 @@ void FlirPtuUnit::restart() {
 
 hal::Task<void> FlirPtuUnit::run() {
   std::array<std::uint8_t, 256> buffer;
-  std::string half;
   for (;;) {
     const auto got = co_await link_.read_some(buffer);
     if (!got) {
-      half.clear();
+      half_.clear();
       continue;
     }
-    const bool off = faults_.is(UnitFault::off);
-    if (was_off_ && !off) restart();
-    was_off_ = off;
-    if (off || clock_.now() < ready_) continue;
-    half += drivers::as_text(drivers::ByteView(buffer).first(*got));
-    for (auto end = half.find_first_of(" \r\n"); end != std::string::npos;
-         end = half.find_first_of(" \r\n")) {
-      const std::string text = half.substr(0, end);
-      half.erase(0, end + 1);
+    if (off_ || clock_.now() < ready_) continue;
+    half_ += drivers::as_text(drivers::ByteView(buffer).first(*got));
+    for (auto end = half_.find_first_of(" \r\n"); end != std::string::npos;
+         end = half_.find_first_of(" \r\n")) {
+      const std::string text = half_.substr(0, end);
+      half_.erase(0, end + 1);
       if (!text.empty()) co_await answer(text);
     }
-    if (half.size() > kHalfMax) half.clear();
+    if (half_.size() > kHalfMax) half_.clear();
   }
 }
 

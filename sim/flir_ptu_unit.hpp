@@ -28,8 +28,8 @@ struct FlirPtuUnitConfig {
   std::uint64_t seed = 1;
 };
 
-// Factory settings (echo, verbose) at the start and after `off`. `wrong` tells positions that are
-// off by that factor; `slow` also turns more slowly.
+// Factory settings (echo, verbose) at the start and when power comes back after `off`, and then a
+// reset. `wrong` tells positions that are off by that factor; `slow` also turns more slowly.
 class FlirPtuUnit final : public PanTruth {
  public:
   FlirPtuUnit(FlirPtuUnitConfig config, hal::Clock& clock, hal::ByteStream& link,
@@ -64,6 +64,7 @@ class FlirPtuUnit final : public PanTruth {
   Answered number(std::int64_t value, std::string_view words) const;
   std::optional<Request> parse(std::string_view text) const;
   void restart();
+  void look_at_power();
 
   Answered position(const Request& request);
   Answered offset(const Request& request);
@@ -95,7 +96,8 @@ class FlirPtuUnit final : public PanTruth {
   std::int64_t head_offset_{};
   std::uint64_t changes_{};
   std::int64_t speed_{}, acceleration_{}, target_{};
-  bool echo_ = true, verbose_ = true, was_off_{};
+  bool echo_ = true, verbose_ = true, off_{};
+  std::string half_;  // Of a request.
   hal::Time ready_{};
   int temperature_f_ = 95;
 };

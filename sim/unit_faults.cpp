@@ -193,6 +193,7 @@ void UnitFaults::set(FaultSetting setting) {
   setting_ = setting;
   since_ = clock_.now();
   ++generation_;
+  if (on_set_) on_set_();
 }
 
 bool UnitFaults::silent() const {

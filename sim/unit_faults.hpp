@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -50,6 +51,9 @@ class UnitFaults {
   explicit UnitFaults(hal::Clock& clock, std::uint64_t seed = 1) : clock_(clock), dice_(seed) {}
 
   void set(FaultSetting setting);
+  // What a unit does at every setting, whether or not anybody speaks to it; {}: nothing. One
+  // unit's.
+  void on_set(std::function<void()> action) { on_set_ = std::move(action); }
   void clear() { set({}); }
   FaultSetting setting() const { return setting_; }
   bool is(UnitFault fault) const { return setting_.fault == fault; }
@@ -73,6 +77,7 @@ class UnitFaults {
   hal::Clock& clock_;
   Dice dice_;
   FaultSetting setting_;
+  std::function<void()> on_set_;
   hal::Time since_{};
   std::uint64_t generation_{};
 };

@@ -241,6 +241,42 @@ TEST_F(FlirPtuLoop, BeginsAnewWithAUnitThatDoesNotAnswer) {
   halt_all();
 }
 
+TEST_F(FlirPtuLoop, StopsWithoutPowerAndResetsWhenItComesBack) {
+  build();
+  ASSERT_TRUE(comes_up(*device, 10s));
+  ASSERT_FALSE(move(-1));
+  ASSERT_TRUE(result_of(device->turn_to(1, 25 * kDeg)));
+  run_for(2s);
+  faults->set({UnitFault::off, 0});
+  const double without_power = truth();
+  run_for(5s);
+  EXPECT_EQ(truth(), without_power);
+  EXPECT_LT(without_power, 0);
+  faults->clear();
+  EXPECT_EQ(truth(), 0);
+  EXPECT_TRUE(move(0.3));  // It resets, without answers.
+  EXPECT_FALSE(comes_up(*device, 5s));
+  EXPECT_TRUE(comes_up(*device, 20s)) << told(*device);
+  EXPECT_FALSE(move(0.3));
+  EXPECT_NEAR(truth(), 0.3, 0.001);
+  EXPECT_EQ(told(*device), "");
+}
+
+// It echoes and uses words again, and was asked for neither.
+TEST_F(FlirPtuLoop, SetsAUnitUpAgainWhosePowerWasAwayForAMoment) {
+  build();
+  ASSERT_TRUE(comes_up(*device, 10s));
+  ASSERT_FALSE(move(-1));
+  faults->set({UnitFault::off, 0});
+  run_for(10ms);
+  faults->clear();
+  EXPECT_TRUE(move(0.3));
+  EXPECT_TRUE(has(*device, "no answer")) << told(*device);
+  EXPECT_TRUE(comes_up(*device, 20s)) << told(*device);
+  EXPECT_FALSE(move(0.3)) << told(*device);
+  EXPECT_NEAR(truth(), 0.3, 0.001);
+}
+
 TEST_F(FlirPtuLoop, ComesBackAfterTheCableWasOut) {
   build();
   ASSERT_TRUE(comes_up(*device, 10s));

@@ -64,16 +64,18 @@ class FlirPtuRates : public drivers_test::LoopRig {
                    settable ? std::optional(std::move(line)) : std::nullopt);
     spawn(device->run());
   }
-  void build(int unit_baud, int host_baud, bool settable = true) {
+  void build(int unit_baud, int host_baud, bool settable = true, hal::Duration reset_time = 12s) {
     lay_line(unit_baud);
-    unit.emplace(sim::FlirPtuUnitConfig{}, clock, *uart, *faults);
+    sim::FlirPtuUnitConfig config;
+    config.reset_time = reset_time;
+    unit.emplace(config, clock, *uart, *faults);
     spawn(unit->run());
     drive_at(host_baud, settable);
   }
   // How long it takes from when the unit can answer until it runs.
   hal::Duration start(bool settable, hal::Duration silence = {}) {
     halt_all();
-    build(9600, 9600, settable);
+    build(9600, 9600, settable, 0s);
     faults->set({UnitFault::off, 0});
     run_for(silence);
     faults->clear();
