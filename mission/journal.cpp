@@ -92,18 +92,15 @@ FileResult<std::int64_t> JournalFile::number(const char* sql) const {
   return std::int64_t{sqlite3_column_int64(statement.get(), 0)};
 }
 
-// Exclusive: nobody else writes, and no shared memory is needed.
+// Exclusive: nobody else writes, and no shared memory is needed. What is not ours is only read.
 FileResult<void> JournalFile::prepare() {
-  for (const char* setting : {"PRAGMA locking_mode=EXCLUSIVE", "PRAGMA journal_mode=WAL",
-                              "PRAGMA synchronous=FULL", "BEGIN IMMEDIATE", "COMMIT"})
+  if (const auto done = run("PRAGMA locking_mode=EXCLUSIVE"); !done) return done;
+  const auto fresh = is_new();
+  if (!fresh) return fresh.error();
+  for (const char* setting :
+       {"PRAGMA journal_mode=WAL", "PRAGMA synchronous=FULL", "BEGIN IMMEDIATE", "COMMIT"})
     if (const auto done = run(setting); !done) return done;
-  const auto version = number("PRAGMA user_version");
-  if (!version) return version.error();
-  if (*version == 0) {
-    const auto empty = number("SELECT count(*) FROM sqlite_master");
-    if (!empty) return empty.error();
-    if (*empty != 0)
-      return FileError{path_, "use", make_error_code(errc::bad_message), "it is no journal"};
+  if (*fresh) {
     const std::string make =
         "BEGIN; CREATE TABLE events (number INTEGER PRIMARY KEY, at_ns INTEGER NOT NULL, kind TEXT "
         "NOT NULL, text TEXT NOT NULL) STRICT; PRAGMA application_id=" +
@@ -118,15 +115,25 @@ FileResult<void> JournalFile::prepare() {
   return {};
 }
 
+FileError JournalFile::refuse(errc::errc_t why, const char* detail) const {
+  return {path_, "use", make_error_code(why), detail};
+}
+
+// Whether there is nothing in it yet.
+FileResult<bool> JournalFile::is_new() const {
+  const auto application = number("PRAGMA application_id"), version = number("PRAGMA user_version"),
+             tables = number("SELECT count(*) FROM sqlite_master");
+  for (const auto* each : {&application, &version, &tables})
+    if (!*each) return each->error();
+  if (*application == kApplication && *version > kVersion)
+    return refuse(errc::not_supported, "a later version made it");
+  const bool fresh = *application == 0 && *version == 0 && *tables == 0;
+  if (!fresh && *application != kApplication) return refuse(errc::bad_message, "it is no journal");
+  return fresh;
+}
+
+// Whole, and without gaps.
 FileResult<void> JournalFile::check() const {
-  const auto refuse = [&](errc::errc_t why, const char* detail) {
-    return FileError{path_, "use", make_error_code(why), detail};
-  };
-  const auto application = number("PRAGMA application_id"), version = number("PRAGMA user_version");
-  if (!application || !version) return (application ? version : application).error();
-  if (*application != kApplication) return refuse(errc::bad_message, "it is no journal");
-  if (*version > kVersion) return refuse(errc::not_supported, "a later version made it");
-  // Whole, and without gaps.
   const auto sound = number("SELECT count(*) FROM pragma_quick_check WHERE quick_check != 'ok'");
   if (!sound) return sound.error();
   const auto missing = number("SELECT ifnull(max(number), 0) - count(*) FROM events");

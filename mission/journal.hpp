@@ -49,7 +49,9 @@ class JournalFile {
   FileResult<void> prepare();
   FileResult<void> run(const char* sql) const;
   FileResult<std::int64_t> number(const char* sql) const;
+  FileResult<bool> is_new() const;
   FileResult<void> check() const;
+  FileError refuse(boost::system::errc::errc_t why, const char* detail) const;
   FileResult<void> insert(std::span<JournalEvent> events);
   FileError error(std::string doing, int result) const;
 

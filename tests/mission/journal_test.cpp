@@ -42,6 +42,10 @@ class JournalTest : public testing::Test {
     EXPECT_EQ(sqlite3_exec(db, all.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sql;
     sqlite3_close(db);
   }
+  std::string bytes() const {
+    std::ifstream in(path_, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
   static std::vector<JournalEvent> some(int count) {
     std::vector<JournalEvent> events;
     for (int i = 0; i < count; ++i)
@@ -100,7 +104,9 @@ TEST_F(JournalTest, RefusesWhatIsNoJournalOrDamaged) {
 
 TEST_F(JournalTest, RefusesOtherDatabasesAndLaterVersions) {
   change("CREATE TABLE other (x)");
+  const std::string before = bytes();
   EXPECT_EQ(JournalFile::open(path_).error().code, errc::bad_message);
+  EXPECT_EQ(bytes(), before) << "it is not ours to change";
   std::filesystem::remove(path_);
   (void)file();
   change("PRAGMA user_version=2");
