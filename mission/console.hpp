@@ -49,8 +49,10 @@ struct ConsoleOrder {
     resume,
     skip,
     home,
-    check_password,  // Answered later by ConsoleSession::password_checked.
-    set_password,    // Answered later by ConsoleSession::password_set.
+    restart,            // The program ends, and begins a new run,
+    resume_from_start,  // or goes on with this one by a robot that stands at its start.
+    check_password,     // Answered later by ConsoleSession::password_checked.
+    set_password,       // Answered later by ConsoleSession::password_set.
   };
   Kind kind{};
   hal::Pose2 pose = {};
@@ -138,6 +140,7 @@ class ConsoleSession {
   std::string resume(const Words& words);
   std::string skip(const Words& words);
   std::string home(const Words& words);
+  std::string restart(const Words& words);
   std::string login(const Words& words);
   std::string logout(const Words& words);
   std::string set_password(const Words& words);

@@ -96,10 +96,14 @@ std::span<const ConsoleSession::Command> ConsoleSession::commands() {
        "It counts like one of the mission's. The mission waits, until `resume`."},
       {"pause", "", false, &S::pause, "let the mission wait where it is; needs no login",
        "A scan that has begun is finished first."},
-      {"resume", "", true, &S::resume, "let the mission go on, from where the robot is",
-       "After you moved it, the stations left are put in a new order from there."},
+      {"resume", "[from-start]", true, &S::resume, "let the mission go on, from where the robot is",
+       "After you moved it, the stations left are put in a new order from there. from-start: the "
+       "robot was carried, or drove without its disk, to where the run began, and stands there.",
+       1},
       {"skip", "", true, &S::skip, "leave out the station that is next", ""},
       {"home", "", true, &S::home, "end the mission and drive home", ""},
+      {"restart", "", true, &S::restart, "end this run here, and begin a new one",
+       "The robot must stand where a run begins. What this one scanned stays in its folder."},
       {"login", "", false, &S::login, "ask for the password; motion needs it",
        "Five wrong ones lock it for a minute. Ten minutes without a key log you out."},
       {"logout", "", false, &S::logout, "forget that you are logged in", ""},
@@ -248,8 +252,13 @@ std::string ConsoleSession::scan(const Words&) {
 std::string ConsoleSession::pause(const Words&) {
   return simple(ConsoleOrder::Kind::pause);
 }
-std::string ConsoleSession::resume(const Words&) {
-  return simple(ConsoleOrder::Kind::resume);
+std::string ConsoleSession::resume(const Words& words) {
+  if (words.size() > 1 && words[1] != "from-start") return "resume, or resume from-start";
+  return simple(words.size() > 1 ? ConsoleOrder::Kind::resume_from_start
+                                 : ConsoleOrder::Kind::resume);
+}
+std::string ConsoleSession::restart(const Words&) {
+  return simple(ConsoleOrder::Kind::restart);
 }
 std::string ConsoleSession::skip(const Words&) {
   return simple(ConsoleOrder::Kind::skip);

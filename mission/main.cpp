@@ -14,7 +14,7 @@
 namespace {
 
 // Exit codes: what the operator's scripts may rely on.
-constexpr int kDone = 0, kFailed = 1, kRefused = 2, kStopped = 3, kUnfinished = 4;
+constexpr int kDone = 0, kFailed = 1, kRefused = 2, kStopped = 3, kUnfinished = 4, kStartAgain = 5;
 
 struct Options {
   std::filesystem::path mission;
@@ -102,7 +102,7 @@ std::optional<int> offer(const Options& options) {
 
 struct RunPlace {
   std::filesystem::path folder;
-  bool resume{};
+  bool resume{}, from_start{};
 };
 
 // A service goes on with the run that it left, once a person has released the robot; where that
@@ -110,7 +110,10 @@ struct RunPlace {
 RunPlace service_run(const std::filesystem::path& runs, const mission::Prepared& prepared,
                      mission::Service& service) {
   const std::filesystem::path last = mission::last_run_folder(runs);
-  if (!last.empty()) {
+  const mission::NextStart ordered = service.this_start();
+  if (ordered == mission::NextStart::anew)
+    service.log("begins a new run, as an operator ordered at the console");
+  if (!last.empty() && ordered != mission::NextStart::anew) {
     const auto left = mission::find_left_run(last);
     if (!left) {
       service.log(fmt::format("begins a new run: {}", left.error().text()));
@@ -124,7 +127,10 @@ RunPlace service_run(const std::filesystem::path& runs, const mission::Prepared&
       mission::RunHistory history = (*left)->history;
       if (const auto whole = mission::verify_scans(history, last); !whole)
         obstacles.push_back(whole.error().text());
-      if (obstacles.empty()) return {last, true};
+      const bool from_start = ordered == mission::NextStart::from_start;
+      if (from_start && obstacles.empty())
+        service.log("goes on from the start, as an operator ordered at the console");
+      if (obstacles.empty()) return {last, true, from_start};
       service.log("begins a new run instead: " + obstacles.front());
     }
   }
@@ -145,11 +151,11 @@ int run(const Options& options) {
   for (const auto* notes : {&prepared.notes, &prepared.tasks.notes})
     for (const std::string& note : *notes) fmt::print(stderr, "note: {}\n", note);
   const RunPlace place = service ? service_run(options.out, prepared, *service)
-                                 : RunPlace{options.out, options.resume};
+                                 : RunPlace{options.out, options.resume, options.from_start};
   const mission::RunOptions run_options{.out = place.folder,
                                         .resume = place.resume,
                                         .skip = options.skip,
-                                        .from_start = options.from_start,
+                                        .from_start = place.from_start,
                                         .judge_cells = options.judge_cells,
                                         .threads = mission::threads_or_all(options.threads),
                                         .progress = options.quiet ? nullptr : &std::cerr,
@@ -161,7 +167,8 @@ int run(const Options& options) {
                                                : mission::run_in_simulation(prepared, run_options);
   print_outcome(outcome.record, outcome.report,
                 std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count());
-  if (service) service->ended();
+  if (service) service->ended(outcome.held);
+  if (service && service->next_start() != mission::NextStart::as_usual) return kStartAgain;
   if (outcome.failure.empty()) return kDone;
   fmt::print(stderr, "vantaged: {}\n", outcome.failure);
   return outcome.stopped ? kStopped : kFailed;
@@ -191,7 +198,8 @@ void add_options(mission::CommandLine& line, Options& options) {
   line.add("--service", &options.service,
            "As a service of systemd (see vantage.service): tells it how far it is, and waits "
            "for a person's release unless the mission says start = \"on-boot\" and the last "
-           "run ended in order; --out holds a numbered folder for each run");
+           "run ended in order and did not leave the robot stopped; --out holds a numbered folder "
+           "for each run");
 }
 
 }  // namespace
@@ -205,7 +213,8 @@ int main(int argc, char** argv) {
       "  vantaged configs/missions/any_site.toml --site path/to/folder --out runs/mine\n"
       "Exit: 0 done, 1 the mission failed (the report says how far it came), 2 refused to start,\n"
       "3 stopped by SIGINT or SIGTERM: the robot stands, and the report says how far it came,\n"
-      "4 an unfinished run is in the folder: nothing was done; --resume or --restart decides.");
+      "4 an unfinished run is in the folder: nothing was done; --resume or --restart decides,\n"
+      "5 a service that is to be started again, as was ordered at its console.");
   add_options(line, options);
   if (!line.parse(argc, argv)) return line.asked_for_help() ? kDone : kRefused;
   try {

@@ -1,5 +1,7 @@
 #include "mission/main_console.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/co_spawn.hpp>
@@ -89,6 +91,10 @@ std::string RobotConsole::obey(const ConsoleOrder& given) {
       return order({.kind = SurveyOrders::Kind::skip});
     case Kind::home:
       return order({.kind = SurveyOrders::Kind::home});
+    case Kind::restart:
+      return start_again(NextStart::anew);
+    case Kind::resume_from_start:
+      return start_again(NextStart::from_start);
     case Kind::check_password:
     case Kind::set_password:
       break;  // The hub's.
@@ -101,6 +107,14 @@ std::string RobotConsole::arm() {
   if (!parts_.gate.begun()) return "not all devices have started yet: `faults` lists what is wrong";
   parts_.gate.ask_release();
   return "asked for its release";
+}
+
+std::string RobotConsole::start_again(NextStart next) {
+  const std::string_view option = next == NextStart::anew ? "--restart" : "--resume --from-start";
+  if (!parts_.start_again)
+    return fmt::format("it is no service: end it, and start it again with {}", option);
+  parts_.start_again(next);
+  return "the robot stands; the program ends, and starts again in some seconds";
 }
 
 // Standing is never refused.

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "drivers/device.hpp"
+#include "mission/boot_mark.hpp"
 #include "mission/console_hub.hpp"
 #include "mission/gated_drive.hpp"
 #include "mission/main_robot.hpp"
@@ -33,6 +34,8 @@ class RobotConsole final : public ConsoleRobot {
     Survey& survey;
     const RobotDrivers& drivers;
     LinkTroubles link_troubles;  // May be empty.
+    // Ends the program in order, and has it begin again so. Empty: nobody would start it again.
+    std::function<void(NextStart)> start_again = {};
   };
   // All must outlive it.
   explicit RobotConsole(Parts parts) : parts_(std::move(parts)) {}
@@ -44,6 +47,7 @@ class RobotConsole final : public ConsoleRobot {
 
  private:
   std::string arm();
+  std::string start_again(NextStart next);
   std::string drive(OperatorPacket packet);
   std::string order(SurveyOrders::Order order);
 

@@ -203,6 +203,7 @@ void GuardedSurvey::stop(std::string reason) {
 
 // Whatever ended it, the robot stands before the program goes on.
 void GuardedSurvey::on_run_end(std::exception_ptr error) {
+  left_held_ = gate_.stopped_by() || (gate_.begun() && !gate_.released());
   gate_.finish();
   if (failure_.empty()) failure_ = stop_reason_.empty() ? text_of(error) : stop_reason_;
   if (!surveying_) survey_.record().end = failure_;
@@ -265,11 +266,16 @@ RunOutcome run_on_hardware(Prepared& prepared, const RunOptions& options) {
                          run.past ? &*run.past : nullptr, options.skip});
   const Signals signals(io, guarded, options.service);
   Worker passwords;  // Planning must not keep anybody from logging in.
-  if (has_console)
-    consoles = std::make_unique<Consoles>(
-        robot.console,
-        RobotConsole::Parts{guarded.gate(), guarded.survey(), drivers, config.watch.link_troubles},
-        io, clock, passwords);
+  if (has_console) {
+    RobotConsole::Parts parts{guarded.gate(), guarded.survey(), drivers,
+                              config.watch.link_troubles};
+    if (options.service != nullptr)
+      parts.start_again = [&guarded, service = options.service](NextStart next) {
+        service->start_again(next);
+        guarded.stop("an operator ordered at the console that it starts again");
+      };
+    consoles = std::make_unique<Consoles>(robot.console, parts, io, clock, passwords);
+  }
   guarded.start();
   if (serving) serving->begin();
   while (!guarded.ended()) io.run_one();
@@ -282,7 +288,7 @@ RunOutcome run_on_hardware(Prepared& prepared, const RunOptions& options) {
   if (std::string unsaved = save_products(store, guarded.survey(), journal); !unsaved.empty())
     failure += (failure.empty() ? "" : "; ") + unsaved;
   return {std::move(record), store.report_path(), std::move(failure),
-          !guarded.stop_reason().empty()};
+          !guarded.stop_reason().empty(), guarded.left_held()};
 }
 
 }  // namespace mission

@@ -53,6 +53,7 @@ class GuardedSurvey {
   bool scanning() const { return scanner_.scanning(); }
   const std::string& failure() const { return failure_; }  // Why it ended early; else empty.
   const std::string& stop_reason() const { return stop_reason_; }  // As given to stop().
+  bool left_held() const { return left_held_; }  // It ended while a release was wanted.
 
  private:
   std::string complaints();
@@ -78,7 +79,7 @@ class GuardedSurvey {
   hal::Devices devices_;
   Survey survey_;
   boost::asio::cancellation_signal cancel_run_, cancel_devices_;
-  bool surveying_ = false, released_ = false, devices_over_ = false;
+  bool surveying_ = false, released_ = false, devices_over_ = false, left_held_ = false;
   std::string failure_, stop_reason_;
 };
 

@@ -62,6 +62,7 @@ struct RunOutcome {
   std::filesystem::path report;
   std::string failure;   // Not empty: what ended it early.
   bool stopped = false;  // By a signal: not for anything that went wrong.
+  bool held = false;     // The robot had been stopped, and nobody had released it since.
 };
 
 // A run's folder, open, and its journal; `past` when it goes on with what lies there.

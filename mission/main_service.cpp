@@ -77,11 +77,14 @@ MissionTasks::MissionTasks(Heartbeat& heartbeat)
 
 Service::Service(fs::path state)
     : state_(std::move(state)), boot_id_(this_boot()), to_journal_(stderr_is_the_journal()) {
-  boot_ = boot_after(mark_of(small_file(state_ / "last_run")), boot_id_,
-                     first_line(small_file(state_ / "stopped_with")));
+  const std::optional<BootMark> last = mark_of(small_file(state_ / "last_run"));
+  left_held_ = last && last->state == BootMark::State::held;
+  boot_ = boot_after(last, boot_id_, first_line(small_file(state_ / "stopped_with")));
+  this_start_ = next_start_of(small_file(state_ / "next_start"));
   mark(BootMark::State::running);
   std::error_code none;
   fs::remove(state_ / "stopped_with", none);  // Of the run before; this one's comes when it ends.
+  fs::remove(state_ / "next_start", none);    // Counts once.
 }
 
 Service::~Service() {
@@ -93,8 +96,13 @@ void Service::mark(BootMark::State state) {
   write_file(state_ / "last_run", {text_of(BootMark{state, boot_id_})}).value();
 }
 
-void Service::ended() {
-  mark(BootMark::State::ended);
+void Service::ended(bool held) {
+  mark(held ? BootMark::State::held : BootMark::State::ended);
+}
+
+void Service::start_again(NextStart next) {
+  write_file(state_ / "next_start", {text_of(next)}).value();
+  next_start_ = next;
 }
 
 void Service::ready() {

@@ -32,8 +32,16 @@ class Service {
   ~Service();
 
   Boot boot() const { return boot_; }
-  // This run ended in order. Throws as the constructor does.
-  void ended();
+  // The last run left the robot stopped: starting anew is no release of it.
+  bool left_held() const { return left_held_; }
+  // This run ended in order; `held`: and the robot stands stopped. Throws as the constructor does.
+  void ended(bool held);
+
+  // As an operator ordered it in the program's last run, or in this one of the next.
+  NextStart this_start() const { return this_start_; }
+  NextStart next_start() const { return next_start_; }
+  // Throws as the constructor does. The program must then end in order.
+  void start_again(NextStart next);
 
   // To the service manager, if there is one. From any thread.
   void ready();
@@ -62,6 +70,8 @@ class Service {
   const std::string boot_id_;
   const bool to_journal_;
   Boot boot_ = Boot::power_cut;
+  bool left_held_ = false;
+  NextStart this_start_ = NextStart::as_usual, next_start_ = NextStart::as_usual;
   drivers::RealClock clock_;
   Heartbeat heartbeat_;
   const MissionTasks tasks_{heartbeat_};

@@ -34,7 +34,7 @@ Serving::Serving(Service& service, const Prepared& prepared,
 void Serving::configure(GuardedSurvey::Config& config) const {
   Service& service = service_;
   config.boot = service.boot();
-  config.starts_held = prepared_.config.start != "on-boot";
+  config.starts_held = prepared_.config.start != "on-boot" || service.left_held();
   config.gate_is_alive = [&service] {
     service.heartbeat().tick(service.tasks().gate_cycle, service.clock().now());
   };

@@ -24,7 +24,8 @@ hal::Task<void> Survey::take_up() {
   if (config_.disk.home() && !past.ended && past.where)
     say_disk(
         "the run's end was not written: the robot is taken to stand where the run last knew it to "
-        "be; if it went home for its disk, stop it and resume with --from-start");
+        "be; if it went home for its disk, `resume from-start` at a service's console, or --resume "
+        "--from-start, tells that it stands at its start");
   tour_the_rest();
   decide({{"t_s", now_s()},
           {"decision", "resumed"},

@@ -168,6 +168,21 @@ TEST(GuardedSurvey, WaitsForAPersonAfterAnEstopHoweverLongItIsPressed) {
   EXPECT_THAT(sim.yard.notes(), HasSubstr("the robot was released after F001-estop-pressed"));
 }
 
+// The next start must not take its own for a release.
+TEST(GuardedSurvey, TellsWhetherItWasLeftStopped) {
+  for (const bool stopped : {false, true}) {
+    SimYard sim;
+    ASSERT_TRUE(sim.run_until_it_drives(1));
+    if (stopped) sim.yard.base().press_estop(true);
+    sim.clock.run_until(sim.clock.now() + 2s);
+    if (stopped) sim.yard.base().press_estop(false);
+    sim.clock.run_until(sim.clock.now() + 2s);
+    sim.yard.survey().stop("SIGTERM");
+    ASSERT_TRUE(sim.run_to_the_end());
+    EXPECT_EQ(sim.yard.survey().left_held(), stopped);
+  }
+}
+
 TEST(GuardedSurvey, StandsWhileAMotorIsTooHotAndGoesOnWhenItHasCooled) {
   SimYard sim;
   ASSERT_TRUE(sim.run_until_it_drives(1));

@@ -15,6 +15,7 @@
 #include "mission/beams_file.hpp"
 #include "mission/main_run.hpp"
 #include "mission/main_service.hpp"
+#include "mission/main_serving.hpp"
 #include "mission/resume.hpp"
 #include "tests/tools/vantage_test.hpp"
 
@@ -49,17 +50,60 @@ class Service : public test::VantageTest {
   void robot(const std::string& backend) {
     std::string text = test::read_text(kServedYard / "robot.toml");
     text.replace(text.find("\"sim\""), 5, backend);
-    write("yard/robot.toml", text + "[drive]\nlink = \"can:vantage9\"\n");
+    write("yard/robot.toml", text + "[drive]\nlink = \"can:vantage9\"\n[console]\nsocket = \"" +
+                                 console_path() + "\"\npassword = \"" +
+                                 (folder_.path() / "password").string() + "\"\n");
+  }
+  static sockaddr_un unix_address(const std::string& path) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::copy(path.begin(), path.end(), address.sun_path);
+    return address;
   }
   void listen() {
     notified_ = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    const std::string path = notify_path();
-    std::copy(path.begin(), path.end(), address.sun_path);
-    ASSERT_EQ(bind(notified_, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+    const sockaddr_un address = unix_address(notify_path());
+    ASSERT_EQ(bind(notified_, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
   }
   std::string notify_path() const { return (folder_.path() / "notify").string(); }
+  std::string console_path() const { return (folder_.path() / "console").string(); }
+
+  // An operator sets the first password, logs in, and orders that.
+  std::string order(const std::string& what) const {
+    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    const sockaddr_un address = unix_address(console_path());
+    const auto late = std::chrono::steady_clock::now() + 30s;
+    while (connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 &&
+           std::chrono::steady_clock::now() < late)
+      std::this_thread::sleep_for(50ms);
+    std::string heard;
+    const auto say = [&](const std::string& line, const std::string& answer) {
+      const std::size_t from = heard.size();
+      if (write_all(fd, line + "\r") != 0) return;
+      while (heard.find(answer, from) == std::string::npos &&
+             std::chrono::steady_clock::now() < late) {
+        timeval wait{1, 0};
+        setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &wait, sizeof wait);
+        std::array<char, 4096> buffer{};
+        const ssize_t size = recv(fd, buffer.data(), buffer.size(), 0);
+        if (size > 0) heard.append(buffer.data(), static_cast<std::size_t>(size));
+        if (size == 0) return;
+      }
+    };
+    const bool first = !fs::exists(folder_.path() / "password");
+    say(first ? "set-password" : "login", "password: ");
+    if (first) say("crossing the yard", "again: ");
+    say("crossing the yard", first ? "the password is set" : "logged in");
+    if (first) say("login", "password: "), say("crossing the yard", "logged in");
+    say(what, "vantage# ");
+    close(fd);
+    return heard;
+  }
+  static int write_all(int fd, const std::string& text) {
+    return send(fd, text.data(), text.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(text.size())
+               ? 0
+               : -1;
+  }
 
   // As systemd starts it.
   void start(bool watched = true) {
@@ -151,7 +195,7 @@ TEST_F(Service, IsReadyWhenItLooksForDevicesAndSaysWhatItWaitsFor) {
   kill(pid_, SIGTERM);
   EXPECT_TRUE(hears("STOPPING=1"));
   EXPECT_EQ(exit_code(), 3) << said();
-  EXPECT_THAT(last_run(), HasSubstr("ended "));
+  EXPECT_THAT(last_run(), HasSubstr("held ")) << "nothing was known of a run before";
   EXPECT_TRUE(fs::exists(state_ / "runs/0001/report.html"));
   EXPECT_THAT(said(), HasSubstr("memory at the start: "));
   EXPECT_THAT(said(), HasSubstr("memory at the end: "));
@@ -211,6 +255,21 @@ TEST_F(Service, IsNotFedWhenItsEventLoopHangsWhichItNames) {
   EXPECT_TRUE(hears("STATUS=the robot is stopped: F801-watchdog-restart"));
 }
 
+// A stop is ended by a person's release, not by ending the program.
+TEST_F(Service, DoesNotStartByItselfWhereTheLastRunLeftTheRobotStopped) {
+  for (const auto& [last, held] : {std::pair("held x\n", true), std::pair("ended x\n", false)}) {
+    write("state/last_run", last);
+    mission::Service service(state_);
+    mission::Prepared prepared;
+    prepared.config.start = "on-boot";
+    boost::asio::io_context io;
+    const mission::Serving serving(service, prepared, {}, io);
+    mission::GuardedSurvey::Config config;
+    serving.configure(config);
+    EXPECT_EQ(config.starts_held, held) << last;
+  }
+}
+
 TEST_F(Service, CheckConfigOnReloadAndSaysWhatTheNextStartWouldChange) {
   start();
   ASSERT_TRUE(hears("READY=1"));
@@ -244,6 +303,40 @@ TEST_F(Service, GoesOnWithTheRunThatItLeft) {
   ASSERT_TRUE(left && left->has_value());
   EXPECT_EQ((*left)->history.resumed, 1);
   EXPECT_EQ((*left)->history.scans().size(), 2U);
+}
+
+TEST_F(Service, BeginsANewRunWhenAnOperatorOrdersIt) {
+  leave_run();
+  start();
+  ASSERT_TRUE(hears("READY=1"));
+  EXPECT_THAT(order("restart"), HasSubstr("the program ends, and starts again"));
+  EXPECT_EQ(exit_code(), 5) << said();
+  EXPECT_TRUE(fs::exists(state_ / "runs/0001/report.html"));
+  for (const char* run : {"0002", "0003"}) {  // What was ordered counts once.
+    start();
+    ASSERT_TRUE(hears("READY=1"));
+    EXPECT_EQ(said().find("as an operator ordered") != std::string::npos, run[3] == '2');
+    EXPECT_TRUE(fs::exists(state_ / "runs" / run));
+    kill(pid_, SIGTERM);
+    EXPECT_EQ(exit_code(), 3);
+  }
+  const auto left = mission::find_left_run(state_ / "runs/0001");
+  ASSERT_TRUE(left && left->has_value());
+  EXPECT_EQ((*left)->history.scans().size(), 2U);
+}
+
+// It forgets where the run last knew it to be.
+TEST_F(Service, TakesTheRobotToStandAtItsStartWhenAnOperatorSaysSo) {
+  leave_run();
+  start();
+  ASSERT_TRUE(hears("READY=1"));
+  EXPECT_THAT(order("resume from-start"), HasSubstr("the program ends, and starts again"));
+  EXPECT_EQ(exit_code(), 5) << said();
+  start();
+  ASSERT_TRUE(hears("READY=1"));
+  EXPECT_THAT(said(), HasSubstr("goes on from the start, as an operator ordered at the console"));
+  EXPECT_FALSE(fs::exists(state_ / "runs/0002"));
+  EXPECT_THAT(order("status"), HasSubstr("mission  "));
 }
 
 TEST_F(Service, BeginsANewRunWhereItCannotGoOnAndTouchesNothing) {

@@ -11,7 +11,7 @@ using mission::BootMark;
 using State = BootMark::State;
 
 TEST(BootMark, IsReadAsItWasWritten) {
-  for (const State state : {State::running, State::hung, State::ended}) {
+  for (const State state : {State::running, State::hung, State::held, State::ended}) {
     const BootMark mark{state, "6e0c1d4f8a21"};
     EXPECT_EQ(mission::mark_of(text_of(mark)), mark);
   }
@@ -28,6 +28,18 @@ TEST(BootMark, OnlyARunThatEndedInOrderLetsTheRobotStartByItself) {
   for (const char* boot_id : {"one", "two"})
     for (const char* stopped_with : {"", "success 0", "watchdog ABRT", "signal KILL"})
       EXPECT_EQ(boot_after(BootMark{State::ended, "one"}, boot_id, stopped_with), Boot::clean);
+}
+
+TEST(BootMark, ARobotThatWasLeftStoppedIsNoCrash) {
+  EXPECT_EQ(boot_after(BootMark{State::held, "one"}, "two", "success 0"), Boot::clean);
+}
+
+TEST(NextStart, IsReadAsItWasWrittenAndAsUsualOtherwise) {
+  using mission::NextStart;
+  for (const NextStart next : {NextStart::as_usual, NextStart::anew, NextStart::from_start})
+    EXPECT_EQ(mission::next_start_of(text_of(next)), next);
+  for (const char* text : {"", "anew", "anew\n\n", "Anew\n", "from start"})
+    EXPECT_EQ(mission::next_start_of(text), NextStart::as_usual) << text;
 }
 
 TEST(BootMark, AMachineThatStartedAnewMeansThatThePowerWasCut) {

@@ -15,9 +15,10 @@ using namespace std::chrono_literals;
 using Kind = mission::ConsoleOrder::Kind;
 
 inline std::string text_of(const mission::ConsoleOrder& order) {
-  static constexpr std::string_view kNames[]{"stop", "arm",  "take over",      "drive",
-                                             "go",   "scan", "pause",          "resume",
-                                             "skip", "home", "check password", "set password"};
+  static constexpr std::string_view kNames[]{
+      "stop",           "arm",         "take over", "drive", "go",      "scan",
+      "pause",          "resume",      "skip",      "home",  "restart", "resume from start",
+      "check password", "set password"};
   std::string text(kNames[static_cast<std::size_t>(order.kind)]);
   if (order.kind == Kind::go)
     text += fmt::format(" {} {}{}", order.pose.position_m.x(), order.pose.position_m.y(),

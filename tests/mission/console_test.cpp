@@ -102,9 +102,9 @@ TEST(Console, HelpsWithEveryCommand) {
   EXPECT_THAT(all, HasSubstr("goto X Y [HEADING]    drive there by the roads, and wait (login)"));
   EXPECT_EQ(talk.type("?\r").substr(2), all.substr(5));
   for (const char* name :
-       {"status", "why",    "faults", "explain",      "log",   "stop",    "disarm",
-        "arm",    "teleop", "goto",   "scan",         "pause", "resume",  "skip",
-        "home",   "login",  "logout", "set-password", "help",  "history", "quit"}) {
+       {"status", "why",          "faults", "explain", "log",    "stop",   "disarm", "arm",
+        "teleop", "goto",         "scan",   "pause",   "resume", "skip",   "home",   "login",
+        "logout", "set-password", "help",   "history", "quit",   "restart"}) {
     EXPECT_THAT(all, HasSubstr("\n" + std::string(name) + " ")) << name;
     EXPECT_THAT(talk.type("help " + std::string(name) + "\r"), Not(HasSubstr("no command")))
         << name;
@@ -155,7 +155,8 @@ TEST(Console, DoesNothingForALineThatIsTooLongOrDamaged) {
 
 TEST(Console, OrdersMotionOnlyAfterALogin) {
   Talk talk;
-  for (const char* moves : {"arm", "teleop", "goto 1 2", "scan", "resume", "skip", "home"}) {
+  for (const char* moves : {"arm", "teleop", "goto 1 2", "scan", "resume", "resume from-start",
+                            "skip", "home", "restart"}) {
     EXPECT_THAT(talk.type(std::string(moves) + "\r"), HasSubstr("needs a login: `login`")) << moves;
     EXPECT_EQ(talk.robot.ordered(), "") << moves;
   }
@@ -177,6 +178,9 @@ TEST(Console, LogsInByAPasswordThatIsNeverShown) {
   talk.type("arm\rgoto 1.5 -2\rgoto 1 2 90\rscan\rpause\rresume\rskip\rhome\r");
   EXPECT_EQ(talk.robot.ordered(),
             "arm\ngo 1.5 -2\ngo 1 2 1.5708\nscan\npause\nresume\nskip\nhome\n");
+  EXPECT_THAT(talk.type("resume anew\r"), HasSubstr("resume, or resume from-start"));
+  talk.type("restart\rresume from-start\r");
+  EXPECT_EQ(talk.robot.ordered(), "restart\nresume from start\n");
   EXPECT_THAT(talk.type("history\r"), Not(HasSubstr("secret")));
   EXPECT_THAT(talk.type("logout\r"), HasSubstr("logged out\nvantage> "));
   EXPECT_THAT(talk.type("arm\r"), HasSubstr("needs a login"));
@@ -255,7 +259,8 @@ TEST(Console, LogsOutWhoHasGone) {
 TEST(Console, CanOnlySetAPasswordWhereThereIsNone) {
   Talk talk;
   talk.robot.now.has_password = false;
-  for (const char* moves : {"arm", "teleop", "goto 1 2", "scan", "resume", "skip", "home"})
+  for (const char* moves :
+       {"arm", "teleop", "goto 1 2", "scan", "resume", "skip", "home", "restart"})
     EXPECT_THAT(talk.type(std::string(moves) + "\r"), HasSubstr("no password was set yet"));
   EXPECT_THAT(talk.type("login\r"), HasSubstr("no password was set yet"));
   EXPECT_EQ(talk.robot.ordered(), "");
