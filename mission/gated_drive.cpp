@@ -106,10 +106,16 @@ Conditions GatedDrive::look(hal::Time now) {
   is.set(Condition::battery_reserve, is_.battery_reserve);
   is.set(Condition::mission_loaded, loaded_);
   is.set(Condition::proven, proven_);
-  const bool reset = safety && safety->reset_pressed;
-  if (reset && !std::exchange(reset_was_, reset)) ask_release();
-  reset_was_ = reset;
+  if (safety) look_at_reset(*safety);
   return is;
+}
+
+// One press is one release. What is still told of a press when inputs are free again, or heard
+// again, came before a person could know that they are.
+void GatedDrive::look_at_reset(const hal::SafetyInputs& safety) {
+  const bool is_free = !safety.estop_pressed && !safety.bumper_pressed;
+  if (is_free && safety.reset_pressed && !reset_was_) ask_release();
+  reset_was_ = !is_free || safety.reset_pressed;
 }
 
 FaultCode GatedDrive::cause_of(Conditions conditions) const {

@@ -94,6 +94,7 @@ class GatedDrive final : public hal::Drive {
   hal::Task<void> until_stop(std::uint64_t holds);
   hal::Twist decide(hal::Time now);
   Conditions look(hal::Time now);
+  void look_at_reset(const hal::SafetyInputs& safety);
   FaultCode cause_of(Conditions conditions) const;
   void on_decision(const Decision& decision, Conditions conditions);
   void tell(const std::string& what) const;

@@ -248,6 +248,25 @@ TEST_F(GatedBase, IsReleasedByTheResetInputOncePressed) {
   EXPECT_TRUE(gate->released());
 }
 
+// Inputs that are not heard count as pressed, and what is told of the press outlasts that.
+TEST_F(GatedBase, TakesOnePressOfTheResetInputForOneRelease) {
+  drive_off();
+  press(*this, true, false);
+  wait(100ms);
+  safety->estop_pressed = false;
+  wait(100ms);
+  safety->reset_pressed = true;
+  wait(1s);
+  ASSERT_TRUE(gate->released());
+  *safety = {};  // Not heard.
+  wait(50ms);
+  EXPECT_FALSE(gate->released());
+  safety->estop_pressed = safety->bumper_pressed = false;
+  safety->reset_pressed = true;
+  wait(1s);
+  EXPECT_FALSE(gate->released());
+}
+
 TEST_F(GatedBase, DoesNotStartByItselfAfterAnEstopBefore) {
   make();
   unit.press_estop(true);
