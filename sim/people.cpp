@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace sim {
 
@@ -32,6 +33,18 @@ void Walker::walk(double span_s, const Eigen::Vector2d& robot_m, double robot_ra
   waited_s_ = 0;
   at_m_ = to_m;
   if ((goal_m - at_m_).norm() < 1e-9) next_ += step_;
+}
+
+// Nobody stands still on a way of one point: whoever puts a robot there means it. Bounded.
+void Walker::make_room(const Eigen::Vector2d& robot_m, double robot_radius_m) {
+  constexpr int kStepsMax = 10000;
+  constexpr double kStepS = 0.05;
+  const Eigen::Vector2d nowhere = Eigen::Vector2d::Constant(1e9);
+  const double keep_m = robot_radius_m + person_.radius_m + kPassesM;
+  const double walked_s = std::exchange(walked_s_, person_.start_s);
+  for (int i = 0; i < kStepsMax && (at_m_ - robot_m).norm() < keep_m; ++i)
+    walk(kStepS, nowhere, 0, false);
+  walked_s_ = walked_s;
 }
 
 double Walker::range_m(const Eigen::Vector3d& from, const Eigen::Vector3d& direction) const {

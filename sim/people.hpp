@@ -25,6 +25,8 @@ class Walker {
   static constexpr double kPatienceS = 3;  // Then turns round.
 
   void walk(double span_s, const Eigen::Vector2d& robot_m, double robot_radius_m, bool robot_moves);
+  // Where a robot is put: goes on along the way, at once, until a standing one is passed.
+  void make_room(const Eigen::Vector2d& robot_m, double robot_radius_m);
   // Along a ray (unit direction) whose origin is given above the ground; infinite: not met.
   double range_m(const Eigen::Vector3d& from, const Eigen::Vector3d& direction) const;
   // The same along many rays from one origin: lowers those of ranges_m that are longer.

@@ -90,6 +90,7 @@ hal::Result<void> World::put_robot(const hal::Pose2& pose, double expected_groun
   const auto at = standing(pose, expected_ground_z_m, config_.radius_m);
   if (!at) return at.error();
   robot_ = *at;
+  for (Walker& walker : people_) walker.make_room(pose.position_m, config_.radius_m);
   left_.target_mps = left_.speed_mps = right_.target_mps = right_.speed_mps = 0;
   clear_m_ = ground_checked_m_ = 0;
   blocked_direction_ = 0;

@@ -67,6 +67,23 @@ TEST(People, AreRunIntoByARobotThatDoesNotLook) {
   EXPECT_TRUE(world.command({-0.2, 0}));
 }
 
+// As when a mission goes on whose robot stopped where somebody's way begins.
+TEST(People, MakeRoomWhereARobotIsPut) {
+  const sim::Mesh mesh = sim_test::plain(100);
+  const sim::Scene scene(mesh);
+  sim::WorldConfig config;
+  config.people = {{.way_m = {{0.1, 0}, {0.1, 9}}, .start_s = 100}};
+  sim::World world(scene, config);
+  ASSERT_TRUE(world.put_robot({{0, 0}, 0}, 0));
+  const Eigen::Vector2d at_m = world.people().front().position_m();
+  EXPECT_NEAR(at_m.x(), 0.1, 1e-9);
+  EXPECT_NEAR(at_m.norm(), config.radius_m + 0.25 + sim::Walker::kPassesM, 0.1);
+  (void)world.command({1, 0});
+  world.advance(hal::Time(2s));
+  EXPECT_EQ(world.collisions(), 0);
+  EXPECT_EQ(world.people().front().position_m(), at_m) << "before they set out";
+}
+
 TEST(People, ShowInProfilesWhereTheyAreNow) {
   const sim::Mesh mesh = sim_test::room(10, 10, 5);
   const sim::Scene scene(mesh);
