@@ -97,12 +97,9 @@ void Service::mark(BootMark::State state) {
 }
 
 void Service::ended(bool held) {
+  if (next_start_ != NextStart::as_usual)
+    write_file(state_ / "next_start", {text_of(next_start_)}).value();
   mark(held ? BootMark::State::held : BootMark::State::ended);
-}
-
-void Service::start_again(NextStart next) {
-  write_file(state_ / "next_start", {text_of(next)}).value();
-  next_start_ = next;
 }
 
 void Service::ready() {

@@ -34,14 +34,14 @@ class Service {
   Boot boot() const { return boot_; }
   // The last run left the robot stopped: starting anew is no release of it.
   bool left_held() const { return left_held_; }
-  // This run ended in order; `held`: and the robot stands stopped. Throws as the constructor does.
+  // This run ended in order; `held`: and the robot stands stopped. Notes what was ordered of the
+  // next start. Throws as the constructor does.
   void ended(bool held);
 
   // As an operator ordered it in the program's last run, or in this one of the next.
   NextStart this_start() const { return this_start_; }
   NextStart next_start() const { return next_start_; }
-  // Throws as the constructor does. The program must then end in order.
-  void start_again(NextStart next);
+  void start_again(NextStart next) { next_start_ = next; }  // The program then has to end.
 
   // To the service manager, if there is one. From any thread.
   void ready();
