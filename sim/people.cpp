@@ -35,7 +35,7 @@ void Walker::walk(double span_s, const Eigen::Vector2d& robot_m, double robot_ra
   if ((goal_m - at_m_).norm() < 1e-9) next_ += step_;
 }
 
-// Nobody stands still on a way of one point: whoever puts a robot there means it. Bounded.
+// Whose way is one point stays. Bounded.
 void Walker::make_room(const Eigen::Vector2d& robot_m, double robot_radius_m) {
   constexpr int kStepsMax = 10000;
   constexpr double kStepS = 0.05;
