@@ -203,7 +203,8 @@ void GuardedSurvey::stop(std::string reason) {
 
 // Whatever ended it, the robot stands before the program goes on.
 void GuardedSurvey::on_run_end(std::exception_ptr error) {
-  left_held_ = gate_.stopped_by() || (gate_.begun() && !gate_.released());
+  const bool wants_release = gate_.begun() || config_.starts_held;  // Begun or not, it stays due.
+  left_held_ = gate_.stopped_by() || (wants_release && !gate_.released());
   gate_.finish();
   if (failure_.empty()) failure_ = stop_reason_.empty() ? text_of(error) : stop_reason_;
   if (!surveying_) survey_.record().end = failure_;

@@ -98,9 +98,13 @@ OpenedRun go_on(const std::vector<RunInput>& inputs, const RunOptions& options) 
   if (std::string why = objections(history, inputs, options); !why.empty()) throw CannotResume(why);
   const std::optional<int> lost = verify_scans(history, options.out).value();
   RunStore store = RunStore::go_on(options.out).value();
+  if (options.from_start) {
+    write_event(journal,
+                at_start_event());  // So that another cut does not bring back the old place.
+    history.stands_at_start();
+  }
   write_event(journal, event_of(RunResumed{history.why_ended(), lost}));
   ++history.resumed;
-  if (options.from_start) history.stands_at_start();
   return {std::move(store), std::move(journal), std::move(history)};
 }
 

@@ -354,6 +354,7 @@ const std::map<std::string, Take>& takes() {
        [](auto& h, const auto& v) { h.last_stop = std::string(v.at("what").as_string()); }},
       {"ended", [](auto& h, const auto& v) { h.ended = read_as<RunEnded>(v); }},
       {"products", [](auto& h, const auto&) { h.products = true; }},
+      {"at_start", [](auto& h, const auto&) { h.stands_at_start(); }},
       {"resumed", take_resumed}};
   return all;
 }
@@ -428,6 +429,9 @@ EventText leaves_event(const std::string& to) {
 }
 EventText stopped_event(const std::string& what) {
   return {"stopped", json_line(json::object{{"what", what}})};
+}
+EventText at_start_event() {
+  return {"at_start", "{}"};
 }
 EventText products_event() {
   return {"products", "{}"};

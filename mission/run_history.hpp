@@ -159,6 +159,7 @@ EventText event_of(const Whereabouts& event);  // On the way.
 EventText leaves_event(const std::string& to);
 EventText stopped_event(const std::string& what);
 EventText products_event();
+EventText at_start_event();  // As a person said of the robot.
 
 // Fails with errc::bad_message, naming the event, for what no run writes. `path` is for the text.
 FileResult<RunHistory> read_history(const std::vector<JournalEvent>& events,

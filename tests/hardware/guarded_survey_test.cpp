@@ -183,6 +183,19 @@ TEST(GuardedSurvey, TellsWhetherItWasLeftStopped) {
   }
 }
 
+TEST(GuardedSurvey, IsStillLeftStoppedWhereItEndsBeforeItsDevicesAreThere) {
+  for (const bool held : {false, true}) {
+    GuardedSurvey::Config config;
+    config.starts_held = held;
+    SimYard sim(config);
+    sim.clock.run_until(sim.clock.now() + 100ms);
+    ASSERT_FALSE(sim.yard.survey().gate().begun());
+    sim.yard.survey().stop("SIGTERM");
+    ASSERT_TRUE(sim.run_to_the_end());
+    EXPECT_EQ(sim.yard.survey().left_held(), held);
+  }
+}
+
 TEST(GuardedSurvey, StandsWhileAMotorIsTooHotAndGoesOnWhenItHasCooled) {
   SimYard sim;
   ASSERT_TRUE(sim.run_until_it_drives(1));

@@ -79,7 +79,8 @@ class Service : public test::VantageTest {
     std::string heard;
     const auto say = [&](const std::string& line, const std::string& answer) {
       const std::size_t from = heard.size();
-      if (write_all(fd, line + "\r") != 0) return;
+      const std::string typed = line + "\r";
+      if (send(fd, typed.data(), typed.size(), MSG_NOSIGNAL) < 0) return;
       while (heard.find(answer, from) == std::string::npos &&
              std::chrono::steady_clock::now() < late) {
         timeval wait{1, 0};
@@ -98,11 +99,6 @@ class Service : public test::VantageTest {
     say(what, "vantage# ");
     close(fd);
     return heard;
-  }
-  static int write_all(int fd, const std::string& text) {
-    return send(fd, text.data(), text.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(text.size())
-               ? 0
-               : -1;
   }
 
   // As systemd starts it.
@@ -143,6 +139,9 @@ class Service : public test::VantageTest {
       scan.beams_checksum = mission::write_beams(beams, {}).value();
       add(mission::event_of(scan));
     }
+    mission::Whereabouts where;
+    where.believed.position_m = {4, 4};
+    add(mission::event_of(where));
     ASSERT_TRUE(mission::JournalFile::open(run / "journal.sqlite")->append(events));
   }
 
@@ -303,6 +302,7 @@ TEST_F(Service, GoesOnWithTheRunThatItLeft) {
   ASSERT_TRUE(left && left->has_value());
   EXPECT_EQ((*left)->history.resumed, 1);
   EXPECT_EQ((*left)->history.scans().size(), 2U);
+  EXPECT_TRUE((*left)->history.where);
 }
 
 TEST_F(Service, BeginsANewRunWhenAnOperatorOrdersIt) {
@@ -336,7 +336,11 @@ TEST_F(Service, TakesTheRobotToStandAtItsStartWhenAnOperatorSaysSo) {
   ASSERT_TRUE(hears("READY=1"));
   EXPECT_THAT(said(), HasSubstr("goes on from the start, as an operator ordered at the console"));
   EXPECT_FALSE(fs::exists(state_ / "runs/0002"));
-  EXPECT_THAT(order("status"), HasSubstr("mission  "));
+  kill(pid_, SIGKILL);
+  exit_code();
+  const auto left = mission::find_left_run(state_ / "runs/0001");
+  ASSERT_TRUE(left && left->has_value());
+  EXPECT_FALSE((*left)->history.where) << "another cut must not bring back the old place";
 }
 
 TEST_F(Service, BeginsANewRunWhereItCannotGoOnAndTouchesNothing) {
