@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <vector>
 
 #include "sim/parallel.hpp"
@@ -16,6 +15,19 @@ namespace {
 
 constexpr std::uint32_t kTile = 4;  // Packets of 4 neighbouring beams of 4 turns after each other,
 constexpr std::uint32_t kPacket = kTile * kTile;  // or of so many beams of a single turn.
+
+// A turn about the pan axis.
+struct PanTurn {
+  double cos = 1, sin = 0;
+
+  static PanTurn of(double pan_rad) { return {std::cos(pan_rad), std::sin(pan_rad)}; }
+  PanTurn then(const PanTurn& next) const {
+    return {cos * next.cos - sin * next.sin, sin * next.cos + cos * next.sin};
+  }
+  Eigen::Vector3d operator*(const Eigen::Vector3d& p) const {
+    return {cos * p.x() - sin * p.y(), sin * p.x() + cos * p.y(), p.z()};
+  }
+};
 
 // What a beam meets.
 struct Met {
@@ -39,6 +51,7 @@ struct ProfileCaster::Impl {
     const Eigen::Isometry3d T_W_S;
     std::span<const MirrorTurn> turns;
     std::uint64_t keys[kTile];
+    PanTurn steps[kTile];  // The pan axis from beam to beam of each turn.
 
     std::uint32_t width() const { return turns.size() == 1 ? kPacket : kTile; }  // Beams.
     void aim(std::uint32_t beam, RTCRayHit16& rays, int* valid) const;
@@ -85,24 +98,23 @@ ProfileCaster::~ProfileCaster() = default;
 
 void ProfileCaster::Impl::Strip::aim(std::uint32_t beam, RTCRayHit16& rays, int* valid) const {
   const auto beams = static_cast<std::uint32_t>(of.P_directions.size());
-  std::optional<double> aimed;  // The pan angle of what follows: mostly that of the ray before.
-  double c{}, s{};
+  PanTurn pan;
   Eigen::Vector3f origin;
   for (std::uint32_t i = 0; i < kPacket; ++i) {
     const std::uint32_t turn =
         std::min<std::uint32_t>(i / width(), static_cast<std::uint32_t>(turns.size()) - 1);
     const std::uint32_t b = std::min(beam + i % width(), beams - 1);
     valid[i] = i / width() < turns.size() && beam + i % width() < beams ? -1 : 0;
-    const double pan = turns[turn].pan_first_rad +
-                       (turns[turn].pan_end_rad - turns[turn].pan_first_rad) * b / beams;
-    const auto turned = [&](const Eigen::Vector3d& p) {
-      return Eigen::Vector3d(c * p.x() - s * p.y(), s * p.x() + c * p.y(), p.z());
-    };
-    if (aimed != pan) {
-      aimed = pan, c = std::cos(pan), s = std::sin(pan);
-      origin = (T_W_S * turned(of.P_origin_m) - of.scene.origin_m()).cast<float>();
-    }
-    const Eigen::Vector3f direction = (T_W_S.linear() * turned(of.P_directions[b])).cast<float>();
+    const MirrorTurn& of_turn = turns[turn];
+    const double turned_rad = of_turn.pan_end_rad - of_turn.pan_first_rad;
+    // Of the first beam of a packet from its angle, of those behind it from the one before.
+    if (i % width() == 0)
+      pan = PanTurn::of(of_turn.pan_first_rad + turned_rad * b / beams);
+    else if (valid[i] != 0 && turned_rad != 0)
+      pan = pan.then(steps[turn]);
+    if (i % width() == 0 || turned_rad != 0)
+      origin = (T_W_S * (pan * of.P_origin_m) - of.scene.origin_m()).cast<float>();
+    const Eigen::Vector3f direction = (T_W_S.linear() * (pan * of.P_directions[b])).cast<float>();
     rays.ray.org_x[i] = origin.x();
     rays.ray.org_y[i] = origin.y();
     rays.ray.org_z[i] = origin.z();
@@ -148,7 +160,7 @@ void ProfileCaster::Impl::cast_still(const Eigen::Isometry3d& T_W_S,
     met_still.resize(beams);
     T_W_S_still = T_W_S;
     pan_still_rad = pan_rad;
-    const Strip one{*this, T_W_S, turns.first(1), {}};
+    const Strip one{*this, T_W_S, turns.first(1), {}, {}};
     one.cast([&](std::uint32_t, std::uint32_t beam, const Met& met) { met_still[beam] = met; });
   }
   for (std::size_t turn = 0; turn < turns.size(); ++turn) {
@@ -171,9 +183,13 @@ void ProfileCaster::cast(const Eigen::Isometry3d& T_W_S, std::span<const MirrorT
     Impl::Strip one{*impl_,
                     T_W_S,
                     turns.subspan(first, std::min<std::size_t>(kTile, turns.size() - first)),
+                    {},
                     {}};
-    for (std::size_t i = 0; i < one.turns.size(); ++i)
+    for (std::size_t i = 0; i < one.turns.size(); ++i) {
       one.keys[i] = impl_->key(one.turns[i].number);
+      one.steps[i] = PanTurn::of((one.turns[i].pan_end_rad - one.turns[i].pan_first_rad) /
+                                 static_cast<double>(beams));
+    }
     one.cast([&](std::uint32_t turn, std::uint32_t beam, const Met& met) {
       ranges_m[(first + turn) * beams + beam] = impl_->reported_m(met, mix(one.keys[turn] + beam));
     });
