@@ -38,6 +38,10 @@ constexpr int kCreeps_mmps = 10, kStands_mmps = 4;  // What it reports.
 constexpr hal::Duration kCreepMax = 1s;             // Until it is seen to move.
 // After 500 ms it brakes: by then at half speed, by then it stands.
 constexpr hal::Duration kHalfMax = 800ms, kStandsMax = 1200ms;
+// 0x000 to 0x22F, 0x260 to 0x7FF, and all extended ids: what a wrong device sends is heard too.
+constexpr hal::CanFilter kFilters[] = {{0x000, 0x600}, {0x200, 0x7E0}, {0x220, 0x7F0},
+                                       {0x260, 0x7E0}, {0x280, 0x780}, {0x300, 0x700},
+                                       {0x400, 0x400}, {0, 0, true}};
 constexpr int kStrangers = 3;  // So many strange frames are no accident.
 
 constexpr Fault kFaults[] = {
@@ -150,6 +154,10 @@ AgilexDrive::AgilexDrive(const Config& config, hal::Clock& clock, hal::CanBus& b
 
 std::span<const Fault> AgilexDrive::faults() const {
   return kFaults;
+}
+
+std::span<const hal::CanFilter> AgilexDrive::filters() {
+  return kFilters;
 }
 
 std::string_view AgilexDrive::model() const {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "drivers/agilex_codec.hpp"
@@ -52,6 +53,9 @@ class AgilexDrive final : public hal::GuardedDrive, public Device {
   hal::Task<hal::Result<hal::Duration>> prove_timeout() override;
 
   std::string_view model() const override;
+  // What it needs to hear: everything but lights, transmitter and the motors' speeds, which a base
+  // reports 50 times a second each.
+  static std::span<const hal::CanFilter> filters();
   hal::Task<void> run() override;
   DeviceState state() const override;
   const Identity& identity() const override { return identity_; }

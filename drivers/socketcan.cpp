@@ -94,7 +94,7 @@ int open_news() {
 
 struct SocketCan::State {
   State(CanAddress its_address, const asio::any_io_executor& its_executor, hal::Clock& its_clock,
-        std::vector<CanFilter> its_filters)
+        std::vector<hal::CanFilter> its_filters)
       : address(std::move(its_address)),
         executor(its_executor),
         clock(its_clock),
@@ -115,7 +115,6 @@ struct SocketCan::State {
   void drain();
   void take(const can_frame& raw, bool own, hal::Time stamp);
   void take_error(const can_frame& raw);
-  bool passes(const hal::CanFrame& frame) const;
   void listen_for(const hal::CanFrame& frame);
   void apply_filters();
 
@@ -125,7 +124,7 @@ struct SocketCan::State {
   const CanAddress address;
   asio::any_io_executor executor;
   hal::Clock& clock;
-  const std::vector<CanFilter> filters;
+  const std::vector<hal::CanFilter> filters;
   asio::cancellation_signal stop_following, stop_pumping, stop_ringing;
 
   Interface interface;
@@ -283,7 +282,7 @@ void SocketCan::State::take(const can_frame& raw, bool own, hal::Time stamp) {
     return;
   }
   const hal::CanFrame frame = from_kernel(raw);
-  if (!passes(frame)) return;
+  if (!hal::passes(filters, frame)) return;
   if (received.full()) {
     ++lost;
     return;
@@ -299,13 +298,6 @@ void SocketCan::State::take_error(const can_frame& raw) {
     set_bus_off(false);
   }
   if ((raw.can_id & CAN_ERR_BUSOFF) != 0) set_bus_off(true);
-}
-
-bool SocketCan::State::passes(const hal::CanFrame& frame) const {
-  const auto lets_pass = [&](const CanFilter& filter) {
-    return filter.extended == frame.extended && ((frame.id ^ filter.id) & filter.mask) == 0;
-  };
-  return filters.empty() || std::any_of(filters.begin(), filters.end(), lets_pass);
 }
 
 // --- Sending.
@@ -335,7 +327,7 @@ hal::Task<void> SocketCan::State::until_changed_or(hal::Time wake) {
 
 void SocketCan::State::listen_for(const hal::CanFrame& frame) {
   const std::pair id(frame.id, frame.extended);
-  if (filters.empty() || passes(frame) ||
+  if (hal::passes(filters, frame) ||
       std::find(sent_ids.begin(), sent_ids.end(), id) != sent_ids.end())
     return;
   sent_ids.push_back(id);
@@ -345,7 +337,7 @@ void SocketCan::State::listen_for(const hal::CanFrame& frame) {
 void SocketCan::State::apply_filters() {
   if (filters.empty() || !socket) return;
   std::vector<can_filter> all;
-  for (const CanFilter& filter : filters)
+  for (const hal::CanFilter& filter : filters)
     all.push_back({filter.id | (filter.extended ? CAN_EFF_FLAG : 0U), filter.mask | CAN_EFF_FLAG});
   for (const auto& [id, extended] : sent_ids)
     all.push_back({id | (extended ? CAN_EFF_FLAG : 0U),
@@ -420,7 +412,7 @@ hal::Task<hal::Result<hal::ReceivedFrame>> SocketCan::receive() {
 // --- The whole.
 
 SocketCan::SocketCan(CanAddress address, const asio::any_io_executor& executor, hal::Clock& clock,
-                     std::vector<CanFilter> filters)
+                     std::vector<hal::CanFilter> filters)
     : address_(std::move(address)),
       state_(std::make_shared<State>(address_, executor, clock, std::move(filters))) {
   const auto ended = [state = state_](std::exception_ptr problem) { end_of_link(problem); };

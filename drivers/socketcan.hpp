@@ -13,11 +13,6 @@
 
 namespace drivers {
 
-struct CanFilter {
-  std::uint32_t id{}, mask{};  // Passes where (id ^ its id) & mask is 0.
-  bool extended{};
-};
-
 // Follows its interface: found again when it was removed and came back, usable while it is up and
 // not bus off. Whoever starts the interface sets the bit rate.
 //
@@ -31,9 +26,9 @@ class SocketCan final : public hal::CanBus, public Link {
  public:
   static constexpr std::size_t kReceivedMax = 1024;
 
-  // Receives what passes any of the filters; all when there is none.
+  // Receives what passes the filters (hal::passes), which the kernel applies.
   SocketCan(CanAddress address, const boost::asio::any_io_executor& executor, hal::Clock& clock,
-            std::vector<CanFilter> filters = {});
+            std::vector<hal::CanFilter> filters = {});
   ~SocketCan() override;
 
   hal::Task<hal::Result<void>> send(hal::CanFrame frame, hal::Time deadline) override;

@@ -1,8 +1,10 @@
 // What links carry, without the waiting: for pure code.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <span>
 
 namespace hal {
 
@@ -16,6 +18,22 @@ struct CanFrame {
 
   bool operator==(const CanFrame&) const = default;
 };
+
+// Which frames are wanted.
+struct CanFilter {
+  std::uint32_t id{}, mask{};  // Passes where (id ^ its id) & mask is 0.
+  bool extended{};
+
+  constexpr bool passes(const CanFrame& frame) const {
+    return extended == frame.extended && ((frame.id ^ id) & mask) == 0;
+  }
+};
+
+// What passes any of the filters; all when there is none.
+constexpr bool passes(std::span<const CanFilter> filters, const CanFrame& frame) {
+  return filters.empty() || std::any_of(filters.begin(), filters.end(),
+                                        [&](const CanFilter& one) { return one.passes(frame); });
+}
 
 // Registers or coils of a Modbus unit.
 struct RegisterRange {

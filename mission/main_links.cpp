@@ -117,7 +117,7 @@ std::vector<ConfigError> link_problems(const MissionConfig& config) {
 HardwareLinks::HardwareLinks(const RobotConfig& config,
                              const boost::asio::any_io_executor& executor, hal::Clock& clock)
     : executor_(executor), clock_(clock) {
-  ends_.drive = open_can("drive", config.drive.link);
+  ends_.drive = open_can("drive", config.drive.link, drive_filters(config.drive));
   if (needs_pan(config.scanner)) {
     ends_.scanner = open_stream("scanner", config.scanner.link);
     open_pan(config.pan.link);
@@ -146,7 +146,8 @@ std::vector<drivers::Trouble> HardwareLinks::troubles(std::string_view role) con
   return all;
 }
 
-hal::CanBus* HardwareLinks::open_can(const std::string& role, const std::string& address) {
+hal::CanBus* HardwareLinks::open_can(const std::string& role, const std::string& address,
+                                     std::vector<hal::CanFilter> filters) {
   const drivers::LinkAddress at = parsed(address);
   if (const auto* usb = std::get_if<drivers::GsUsbAddress>(&at)) {
     if (!usb_) usb_ = std::make_unique<drivers::GsUsbBus>(executor_, clock_);
@@ -154,8 +155,8 @@ hal::CanBus* HardwareLinks::open_can(const std::string& role, const std::string&
     named_.push_back({role, &channel});
     return &channel;
   }
-  auto bus =
-      std::make_shared<drivers::SocketCan>(std::get<drivers::CanAddress>(at), executor_, clock_);
+  auto bus = std::make_shared<drivers::SocketCan>(std::get<drivers::CanAddress>(at), executor_,
+                                                  clock_, std::move(filters));
   owned_.push_back(bus);
   named_.push_back({role, bus.get()});
   return bus.get();

@@ -40,7 +40,8 @@ class HardwareLinks {
   std::vector<drivers::Trouble> troubles(std::string_view role) const;
 
  private:
-  hal::CanBus* open_can(const std::string& role, const std::string& address);
+  hal::CanBus* open_can(const std::string& role, const std::string& address,
+                        std::vector<hal::CanFilter> filters);
   hal::ByteStream* open_stream(const std::string& role, const std::string& address);
   drivers::SerialPort& open_serial(const std::string& role, const drivers::SerialLine& line);
   void open_pan(const std::string& address);

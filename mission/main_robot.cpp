@@ -61,6 +61,12 @@ std::string tcp_host(const std::string& link) {
 
 }  // namespace
 
+std::vector<hal::CanFilter> drive_filters(const DriveConfig& drive) {
+  if (drive.device == "cia402") return {};
+  const auto filters = drivers::AgilexDrive::filters();
+  return {filters.begin(), filters.end()};
+}
+
 drivers::OusterApi RobotDrivers::ouster_api(const RobotConfig& config, const Links& links) {
   drivers::OusterApi api;
   if (!asks_ouster(config.scanner)) return api;

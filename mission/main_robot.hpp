@@ -40,6 +40,9 @@ constexpr std::string_view fault_role(std::string_view named) {
 // has. Empty: nothing.
 std::vector<ConfigError> robot_problems(const MissionConfig& config);
 
+// What the drive's driver needs to hear of its bus (hal::passes).
+std::vector<hal::CanFilter> drive_filters(const DriveConfig& drive);
+
 class RobotDrivers {
  public:
   struct Links {

@@ -213,7 +213,7 @@ SimulatedRobot::SimulatedRobot(const RobotConfig& config, const drivers::GeoAnch
       corrections_(clock),
       scanner_api_(clock),
       packets_(clock) {
-  hal::CanBus& drivers_end = can_.attach();
+  hal::CanBus& drivers_end = can_.attach(drive_filters(config.drive));
   const UnitLinks ends{.drive = &can_.attach(),
                        .second_drive = config.drive.device == "cia402" ? &can_.attach() : nullptr,
                        .scanner = &scanner_.b(),

@@ -195,8 +195,8 @@ hal::Task<void> AgilexUnit::report_v1() {
 }
 
 // A frame that finds no way to the bus in time is not sent: the next one says more.
-hal::Task<void> AgilexUnit::send(const Message& message) {
-  (void)co_await bus_.send(encode(message), clock_.now() + kCycle);
+hal::Task<hal::Result<void>> AgilexUnit::send(const Message& message) {
+  return bus_.send(encode(message), clock_.now() + kCycle);
 }
 
 VehicleState AgilexUnit::vehicle() const {

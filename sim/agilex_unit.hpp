@@ -55,7 +55,7 @@ class AgilexUnit {
   hal::Task<void> report_fast();
   hal::Task<void> report_slow(std::int64_t cycle);
   hal::Task<void> report_v1();
-  hal::Task<void> send(const drivers::agilex::Message& message);
+  hal::Task<hal::Result<void>> send(const drivers::agilex::Message& message);
   drivers::agilex::VehicleState vehicle() const;
   bool stalled() const;  // For long enough to be told.
   double battery_v() const;

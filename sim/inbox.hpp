@@ -40,14 +40,9 @@ class Inbox {
   // The first message that has arrived; waits for one. Fails once for each cut().
   hal::Task<hal::Result<Item>> take() {
     for (;;) {
-      if (loss_untold_ && (connected_ || items_.empty())) {
-        loss_untold_ = false;
-        co_return lost_;
-      }
+      if (auto item = take_now()) co_return std::move(*item);
       if (items_.empty()) {
         co_await changed_.wait();
-      } else if (auto item = take_ready()) {
-        co_return std::move(*item);
       } else if (!overtaking_) {
         co_await clock_.sleep_until(items_.front().due);
       } else {
@@ -57,7 +52,17 @@ class Inbox {
     }
   }
 
-  // Without waiting.
+  // What take() would say at once, if it need not wait.
+  std::optional<hal::Result<Item>> take_now() {
+    if (loss_untold_ && (connected_ || items_.empty())) {
+      loss_untold_ = false;
+      return lost_;
+    }
+    if (auto item = take_ready()) return std::move(*item);
+    return std::nullopt;
+  }
+
+  // Without waiting, whatever was lost.
   std::optional<Item> take_ready() {
     if (items_.empty() || items_.front().due > clock_.now()) return std::nullopt;
     std::optional<Item> item(std::move(items_.front()));

@@ -1,15 +1,17 @@
 // The links of simulated missions, in memory: what one end sends, the other receives.
 //
 // Everything happens on one event loop, by a clock, and repeats exactly. Destroy a wire before the
-// io_context on which its users run. Bounded everywhere; each wire says what happens when full.
+// event loop on which its users run. Bounded everywhere; each wire says what happens when full.
 // For a person's hand or a test: cut() and mend(), and set_faults() at any time.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "hal/clock.hpp"
+#include "hal/frames.hpp"
 #include "hal/links.hpp"
 #include "sim/link_faults.hpp"
 #include "sim/register_unit.hpp"
@@ -38,7 +40,8 @@ class CanWire {
   CanWire(hal::Clock& clock, Config config);
   ~CanWire();
 
-  End& attach();  // One more end; lives as long as the wire.
+  // One more end, that receives what passes; lives as long as the wire.
+  End& attach(std::vector<hal::CanFilter> filters = {});
   void set_faults(const LinkFaults& faults);
   void cut();  // All ends.
   void mend();

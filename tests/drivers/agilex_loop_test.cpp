@@ -11,7 +11,8 @@ using drivers::DeviceState;
 using sim::UnitFault;
 
 struct AgilexLoop : testing::Test, DriveBench {
-  sim::CanWire::End& host = wire.attach();
+  sim::CanWire::End& host =
+      wire.attach({drivers::AgilexDrive::filters().begin(), drivers::AgilexDrive::filters().end()});
   sim::CanWire::End& base = wire.attach();
   sim::UnitFaults faults{clock};
   std::unique_ptr<sim::AgilexUnit> unit;
@@ -48,6 +49,19 @@ TEST_F(AgilexLoop, TakesCommandAndSaysWhoItIs) {
   EXPECT_EQ(drive->identity().maker, "AgileX Robotics");
   EXPECT_EQ(drive->identity().model, "agilex-scout2");
   EXPECT_EQ(drive->identity().firmware, "main board 2.3, drivers 1.5");
+}
+
+TEST(AgilexDrive, HearsEveryIdButLightsTransmitterAndMotorSpeeds) {
+  hal::CanFrame frame;
+  for (frame.id = 0; frame.id < 0x800; ++frame.id) {
+    const std::uint32_t kind = frame.id & 0x7F0;
+    EXPECT_NE(hal::passes(drivers::AgilexDrive::filters(), frame),
+              kind == 0x230 || kind == 0x240 || kind == 0x250)
+        << frame.id;
+  }
+  frame.extended = true;
+  for (frame.id = 1; frame.id < 1u << 29; frame.id *= 3)
+    EXPECT_TRUE(hal::passes(drivers::AgilexDrive::filters(), frame));
 }
 
 TEST_F(AgilexLoop, HearsTheTravelThatTheWorldDrove) {

@@ -57,6 +57,26 @@ std::vector<std::uint32_t> ids(const std::vector<hal::ReceivedFrame>& frames) {
   return all;
 }
 
+TEST_F(Wires, AnEndHearsWhatPassesItsFilters) {
+  sim::CanWire wire(clock);
+  hal::CanBus& from = wire.attach();
+  hal::CanBus& all = wire.attach();
+  hal::CanBus& some = wire.attach({{0x100, 0x700}, {0x3, 0x1FFFFFFF, true}});
+  std::vector<hal::ReceivedFrame> by_all, by_some;
+  const auto hear = [](hal::CanBus& bus, std::vector<hal::ReceivedFrame>& into) -> hal::Task<void> {
+    for (;;) into.push_back((co_await bus.receive()).value());
+  };
+  const auto send = [&]() -> hal::Task<void> {
+    for (const std::uint32_t id : {0x0FFu, 0x100u, 0x1FFu, 0x200u, 0x3u})
+      for (const bool extended : {false, true})
+        (co_await from.send({.id = id, .extended = extended}, clock.now() + 1s)).value();
+    co_await clock.sleep_for(1s);
+  };
+  run([&]() -> hal::Task<void> { co_await (send() || hear(all, by_all) || hear(some, by_some)); });
+  EXPECT_EQ(by_all.size(), 10);
+  EXPECT_EQ(ids(by_some), (std::vector<std::uint32_t>{0x100, 0x1FF, 0x3}));
+}
+
 TEST(CanWireFaults, DelayAndJitterKeepTheOrder) {
   const auto heard = through_can({.delay = 20ms, .jitter = 5ms}, 1);
   ASSERT_EQ(heard.size(), 200U);

@@ -108,7 +108,7 @@ Rig::Rig(const RandomYard& yard, hal::Clock& clock, const hal::Pose2& stands)
       imu_(clock),
       gnss_(clock),
       obstacles_(clock),
-      drivers_end_(can_.attach()),
+      drivers_end_(can_.attach(mission::drive_filters(yard.config.robot.drive))),
       bus_(can_.attach()) {
   if (!world_.put_robot(stands, 0)) throw std::runtime_error("the robot cannot stand there");
   connect(clock);
