@@ -5,6 +5,7 @@
 
 #include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/co_spawn.hpp>
+#include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <csignal>
@@ -157,10 +158,11 @@ hal::Task<void> GuardedSurvey::run_devices() {
 
 void GuardedSurvey::start() {
   const auto devices_ended = [this](std::exception_ptr error) { on_devices_end(error); };
-  asio::co_spawn(parts_.io, run_devices(),
+  asio::co_spawn(parts_.executor, run_devices(),
                  asio::bind_cancellation_slot(cancel_devices_.slot(), devices_ended));
   const auto run_ended = [this](std::exception_ptr error) { on_run_end(error); };
-  asio::co_spawn(parts_.io, run(), asio::bind_cancellation_slot(cancel_run_.slot(), run_ended));
+  asio::co_spawn(parts_.executor, run(),
+                 asio::bind_cancellation_slot(cancel_run_.slot(), run_ended));
 }
 
 hal::Task<void> GuardedSurvey::run() {
@@ -208,7 +210,7 @@ void GuardedSurvey::on_run_end(std::exception_ptr error) {
   gate_.finish();
   if (failure_.empty()) failure_ = stop_reason_.empty() ? text_of(error) : stop_reason_;
   if (!surveying_) survey_.record().end = failure_;
-  asio::co_spawn(parts_.io, release_within(parts_.drivers, parts_.clock),
+  asio::co_spawn(parts_.executor, release_within(parts_.drivers, parts_.clock),
                  [this](std::exception_ptr release_error) { on_released(release_error); });
 }
 
@@ -263,7 +265,7 @@ RunOutcome run_on_hardware(Prepared& prepared, const RunOptions& options) {
     if (consoles) consoles->hub().tell(what);
   };
   GuardedSurvey guarded(prepared, options.threads, config,
-                        {io, clock, drivers, store, progress, worker, &journal,
+                        {io.get_executor(), clock, drivers, store, progress, worker, &journal,
                          run.past ? &*run.past : nullptr, options.skip});
   const Signals signals(io, guarded, options.service);
   Worker passwords;  // Planning must not keep anybody from logging in.

@@ -1,8 +1,8 @@
 // A mission in real time on real devices. Like main.cpp it may know everything.
 #pragma once
 
+#include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/cancellation_signal.hpp>
-#include <boost/asio/io_context.hpp>
 #include <optional>
 #include <string>
 
@@ -27,7 +27,7 @@ class GuardedSurvey {
     std::function<void()> gate_is_alive;  // The same.
   };
   struct Parts {
-    boost::asio::io_context& io;
+    boost::asio::any_io_executor executor;
     hal::Clock& clock;
     RobotDrivers& drivers;
     RunStore& store;

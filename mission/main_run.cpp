@@ -59,8 +59,8 @@ std::string run_survey(SimBackend& backend, Survey& survey,
       failure = e.what();
     }
   };
-  boost::asio::co_spawn(backend.io(), start_and_survey(backend.drivers(), backend.gate(), survey),
-                        on_end);
+  boost::asio::co_spawn(backend.executor(),
+                        start_and_survey(backend.drivers(), backend.gate(), survey), on_end);
   const auto done = [&] {
     if (watch) watch(backend);
     return ended;

@@ -224,7 +224,7 @@ hal::Task<void> SimBackend::run_robot() {
 
 bool SimBackend::run(const std::function<bool()>& done) {
   if (!started_)
-    boost::asio::co_spawn(io_, run_robot(), [this](std::exception_ptr error) {
+    boost::asio::co_spawn(executor(), run_robot(), [this](std::exception_ptr error) {
       try {
         if (error) std::rethrow_exception(error);
         failure_ = "the robot's devices ended by themselves";

@@ -2,7 +2,7 @@
 // Like main.cpp it may know everything.
 #pragma once
 
-#include <boost/asio/io_context.hpp>
+#include <boost/asio/any_io_executor.hpp>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -16,6 +16,7 @@
 #include "mission/record.hpp"
 #include "mission/site_model.hpp"
 #include "mission/survey.hpp"
+#include "sim/event_loop.hpp"
 #include "sim/mesh.hpp"
 #include "sim/placement.hpp"
 #include "sim/scene.hpp"
@@ -63,9 +64,9 @@ class SimBackend {
   // Throws std::runtime_error when the robot cannot stand at its start.
   SimBackend(const MissionConfig& config, const SiteTasks& tasks, SimSite site, int threads);
 
-  hal::Clock& clock() { return clock_; }
+  sim::SimClock& clock() { return clock_; }
   hal::Devices& devices() { return devices_; }
-  boost::asio::io_context& io() { return io_; }
+  boost::asio::any_io_executor executor() { return loop_.get_executor(); }
   RobotDrivers& drivers() { return robot_.drivers(); }
   RobotUnits& units() { return robot_.units(); }
   SimulatedRobot& robot() { return robot_; }
@@ -104,8 +105,8 @@ class SimBackend {
   const MissionConfig config_;
   const int threads_;
   SimWorld true_site_;
-  boost::asio::io_context io_{1};
-  sim::SimClock clock_{io_};
+  sim::EventLoop loop_;
+  sim::SimClock clock_{loop_};
   SimulatedRobot robot_;
   std::vector<std::string> events_;
   std::function<void(const std::string&)> on_event_;

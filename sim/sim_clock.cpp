@@ -8,6 +8,7 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <cstddef>
+#include <iterator>
 #include <new>
 
 namespace sim {
@@ -17,7 +18,7 @@ using boost::system::error_code;
 // One waiting coroutine. It lives in the frame that sleep_until makes, which its handler keeps
 // alive: whoever finishes it must take the handler out first.
 struct SimClock::Sleeper {
-  enum class End { call, drop };
+  enum class End { call, post, drop };  // Call: nothing else is ready.
 
   alignas(std::max_align_t) std::byte handler[64];
   void (*finish)(Sleeper& self, End end, error_code ec) = nullptr;
@@ -36,11 +37,12 @@ void SimClock::enlist(Sleeper& sleeper, hal::Time wake, Handler handler) {
     if (end == Sleeper::End::drop) return;  // Destroying it unwinds the coroutine.
     if (auto own = boost::asio::get_associated_cancellation_slot(taken); own.is_connected())
       own.clear();
+    if (end == Sleeper::End::call) return std::move(taken)(ec);
     const auto executor = boost::asio::get_associated_executor(taken);
     boost::asio::post(executor,
                       [handler = std::move(taken), ec]() mutable { std::move(handler)(ec); });
   };
-  sleepers_.emplace_hint(sleepers_.end(), key, &sleeper);
+  sleepers_.emplace(key, &sleeper);
   if (slot.is_connected())
     boost::asio::cancellation_slot(slot).assign([this, key](boost::asio::cancellation_type type) {
       if (type != boost::asio::cancellation_type::none) cancel(key);
@@ -58,9 +60,9 @@ hal::Task<void> SimClock::sleep_until(hal::Time wake) {
 
 SimClock::~SimClock() {
   while (!sleepers_.empty()) {
-    Sleeper* const last = sleepers_.begin()->second;
-    sleepers_.erase(sleepers_.begin());
-    last->finish(*last, Sleeper::End::drop, {});
+    Sleeper* const first = sleepers_.rbegin()->second;
+    sleepers_.erase(std::prev(sleepers_.end()));
+    first->finish(*first, Sleeper::End::drop, {});
   }
 }
 
@@ -69,31 +71,37 @@ void SimClock::cancel(const Key& key) {
   if (found == sleepers_.end()) return;  // It woke in the meantime.
   Sleeper* const sleeper = found->second;
   sleepers_.erase(found);
-  sleeper->finish(*sleeper, Sleeper::End::call, boost::asio::error::operation_aborted);
+  sleeper->finish(*sleeper, Sleeper::End::post, boost::asio::error::operation_aborted);
 }
 
 void SimClock::wake_first() {
-  const auto [key, sleeper] = *sleepers_.begin();
+  const auto [key, sleeper] = *sleepers_.rbegin();
   woken_at_once_ = key.first == now_ ? woken_at_once_ + 1 : 0;
   if (woken_at_once_ > kReadyMax) {
     woken_at_once_ = 0;
     throw Spins("time is asked for again and again and stands still");
   }
-  sleepers_.erase(sleepers_.begin());
+  sleepers_.erase(std::prev(sleepers_.end()));
   now_ = key.first;
+  if (loop_ == nullptr) return sleeper->finish(*sleeper, Sleeper::End::post, {});
+  const EventLoop::Inside inside(*loop_);
   sleeper->finish(*sleeper, Sleeper::End::call, {});
 }
 
+bool SimClock::run_one() {
+  if (loop_ != nullptr) return loop_->run_one();
+  io_->restart();
+  return io_->poll_one() > 0;
+}
+
 void SimClock::run_ready() {
-  for (int ran = 0; ran <= kReadyMax; ++ran) {
-    io_.restart();
-    if (io_.poll_one() == 0) return;
-  }
+  for (int ran = 0; ran <= kReadyMax; ++ran)
+    if (!run_one()) return;
   throw Spins("the event loop runs on and on while time stands still");
 }
 
 void SimClock::run_until(hal::Time end) {
-  for (run_ready(); !sleepers_.empty() && sleepers_.begin()->first.first <= end; run_ready())
+  for (run_ready(); !sleepers_.empty() && sleepers_.rbegin()->first.first <= end; run_ready())
     wake_first();
   now_ = std::max(now_, end);
 }

@@ -2,13 +2,14 @@
 #pragma once
 
 #include <boost/asio/io_context.hpp>
+#include <boost/container/flat_map.hpp>
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <stdexcept>
 #include <utility>
 
 #include "hal/clock.hpp"
+#include "sim/event_loop.hpp"
 
 namespace sim {
 
@@ -16,13 +17,15 @@ namespace sim {
 // run in the order they were asked for, each one until everything waits again.
 //
 // What a handler throws (a top-level coroutine's own handler should rethrow) leaves run() and
-// run_until(); the clock can be run again afterwards. Destroy the clock before the io_context:
-// sleepers that are left then are unwound when the io_context is destroyed. Where more than
+// run_until(); the clock can be run again afterwards. Destroy the clock before the event loop:
+// sleepers that are left then are unwound when the event loop is destroyed. Where more than
 // kReadyMax handlers run, or sleepers wake, while time stands still, somebody spins: run() and
 // run_until() throw Spins.
 class SimClock final : public hal::Clock {
  public:
-  explicit SimClock(boost::asio::io_context& io) : io_(io) {}
+  explicit SimClock(EventLoop& loop) : loop_(&loop) {}
+  // For those who need sockets or timers beside it: the same, slower.
+  explicit SimClock(boost::asio::io_context& io) : io_(&io) {}
   ~SimClock() override;
   SimClock(const SimClock&) = delete;
   SimClock& operator=(const SimClock&) = delete;
@@ -35,6 +38,9 @@ class SimClock final : public hal::Clock {
   hal::Time now() const override { return now_; }
   // A wake-up in the past wakes at once, after everything that is ready now.
   hal::Task<void> sleep_until(hal::Time wake) override;
+
+  // Runs a handler that is ready, without waiting; false: there is none.
+  bool run_one();
 
   // Runs everything due up to and including `end`; now() is `end` afterwards.
   void run_until(hal::Time end);
@@ -54,11 +60,13 @@ class SimClock final : public hal::Clock {
   void run_ready();
   void wake_first();
 
-  boost::asio::io_context& io_;
+  EventLoop* loop_ = nullptr;  // One of the two is there.
+  boost::asio::io_context* io_ = nullptr;
   hal::Time now_{};
   std::uint64_t asked_{};
   int woken_at_once_{};  // Since time moved last.
-  std::map<Key, Sleeper*> sleepers_;
+  // The first to wake is the last one: they are few, and most go to sleep for a short time.
+  boost::container::flat_map<Key, Sleeper*, std::greater<>> sleepers_;
 };
 
 }  // namespace sim

@@ -8,6 +8,7 @@
 #include "drivers/cia402_drive.hpp"
 #include "sim/agilex_unit.hpp"
 #include "sim/cia402_unit.hpp"
+#include "sim/event_loop.hpp"
 #include "sim/links.hpp"
 #include "sim/sim_clock.hpp"
 #include "tests/sim/room.hpp"
@@ -24,9 +25,10 @@ const sim::Scene& plain() {
   return *scene;
 }
 
+template <class Loop = sim::EventLoop>
 struct Minutes {
-  boost::asio::io_context io;
-  sim::SimClock clock{io};
+  Loop loop;
+  sim::SimClock clock{loop};
   sim::World world{plain(), {}};
   sim::CanWire wire{clock};
   sim::UnitFaults left_faults{clock}, right_faults{clock};
@@ -34,7 +36,7 @@ struct Minutes {
   Minutes() { world.put_robot({{0, 0}, 0}, 0).value(); }
 
   void spawn(hal::Task<void> task) {
-    boost::asio::co_spawn(io, std::move(task), [](std::exception_ptr problem) {
+    boost::asio::co_spawn(loop.get_executor(), std::move(task), [](std::exception_ptr problem) {
       if (problem) std::rethrow_exception(problem);
     });
   }
@@ -58,25 +60,30 @@ struct Minutes {
 };
 
 void Direct(benchmark::State& state) {
-  Minutes minutes;
+  Minutes<> minutes;
   direct::Drive drive(minutes.world, minutes.clock);
   minutes.run(state, drive);
 }
 BENCHMARK(Direct)->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
 
+template <class Loop>
 void Agilex(benchmark::State& state) {
-  Minutes minutes;
+  Minutes<Loop> minutes;
   sim::AgilexUnit unit({}, minutes.world, nullptr, minutes.clock, minutes.wire.attach(),
                        minutes.left_faults);
-  drivers::AgilexDrive drive({}, minutes.clock, minutes.wire.attach());
+  const auto filters = drivers::AgilexDrive::filters();
+  drivers::AgilexDrive drive({}, minutes.clock,
+                             minutes.wire.attach({filters.begin(), filters.end()}));
   minutes.spawn(unit.run());
   minutes.spawn(drive.run());
   minutes.run(state, drive);
 }
-BENCHMARK(Agilex)->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
+// The same, and the slower loop.
+BENCHMARK(Agilex<sim::EventLoop>)->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
+BENCHMARK(Agilex<boost::asio::io_context>)->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
 
 void Cia402(benchmark::State& state) {
-  Minutes minutes;
+  Minutes<> minutes;
   sim::Cia402NodeConfig left, right;
   right.node = 2;
   sim::Cia402Unit unit(left, right, minutes.world, minutes.clock, minutes.wire.attach(),

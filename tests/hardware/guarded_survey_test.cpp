@@ -38,7 +38,7 @@ class Yard {
         world_(prepared_.config, prepared_.tasks, std::move(prepared_.sim), 1),
         robot_(prepared_.config.robot, mission::kSimAnchor, 1, 1, world_.world(), clock),
         survey_(prepared_, 1, std::move(config),
-                {io, clock, robot_.drivers(), store_, progress_, compute}) {}
+                {io.get_executor(), clock, robot_.drivers(), store_, progress_, compute}) {}
 
   void start() {
     boost::asio::co_spawn(io_, robot_.units().run(), [](std::exception_ptr error) {

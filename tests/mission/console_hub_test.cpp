@@ -35,7 +35,7 @@ struct Hub : testing::Test {
         clock, robot, compute);
   }
   std::unique_ptr<Person> sit_down(mission::ConsoleHub::Who who = kAtTheLine, bool reads = true) {
-    auto person = std::make_unique<Person>(io, clock, *hub, who, reads);
+    auto person = std::make_unique<Person>(io.get_executor(), clock, *hub, who, reads);
     wait(100ms);
     return person;
   }

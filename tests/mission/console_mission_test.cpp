@@ -37,10 +37,10 @@ class Mission {
         robot_({backend_.gate(), survey_, backend_.drivers(), {}}),
         hub_({.password = site_.folder() / "password", .first_number = [] { return 1000; }},
              backend_.clock(), robot_, compute_),
-        person_(std::make_unique<Person>(backend_.io(), backend_.clock(), hub_, kAtTheLine)) {
+        person_(std::make_unique<Person>(backend_.executor(), backend_.clock(), hub_, kAtTheLine)) {
     backend_.gate().watch_surroundings([this] { return survey_.surroundings(); });
     survey_.orders().tell_to([this](const std::string& what) { hub_.tell(what); });
-    boost::asio::co_spawn(backend_.io(), carry_out(), [this](std::exception_ptr error) {
+    boost::asio::co_spawn(backend_.executor(), carry_out(), [this](std::exception_ptr error) {
       over_ = true;
       try {
         if (error) std::rethrow_exception(error);

@@ -2,10 +2,10 @@
 #pragma once
 
 #include <array>
+#include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/cancellation_signal.hpp>
 #include <boost/asio/co_spawn.hpp>
-#include <boost/asio/io_context.hpp>
 #include <exception>
 #include <string>
 #include <string_view>
@@ -14,15 +14,18 @@
 #include "hal/together.hpp"
 #include "mission/console_hub.hpp"
 #include "sim/links.hpp"
+#include "sim/sim_clock.hpp"
 
 namespace console_test {
 
 // A console served on a wire; closes it when it goes.
 class Person {
  public:
-  Person(boost::asio::io_context& io, hal::Clock& clock, mission::ConsoleHub& hub,
-         mission::ConsoleHub::Who who, bool reads = true)
-      : io_(io), wire_(clock, {.bytes_per_s = 11520, .unread_max = 4096}) {
+  Person(const boost::asio::any_io_executor& executor, sim::SimClock& clock,
+         mission::ConsoleHub& hub, mission::ConsoleHub::Who who, bool reads = true)
+      : executor_(executor),
+        clock_(clock),
+        wire_(clock, {.bytes_per_s = 11520, .unread_max = 4096}) {
     std::vector<hal::Task<void>> all;
     all.push_back(hub.serve(wire_.a(), who));
     if (reads) all.push_back(read());
@@ -33,19 +36,19 @@ class Person {
       } catch (const std::exception&) {  // Closed, each part of it.
       }
     };
-    boost::asio::co_spawn(io_, hal::together(std::move(all)),
+    boost::asio::co_spawn(executor_, hal::together(std::move(all)),
                           boost::asio::bind_cancellation_slot(cancel_.slot(), ended));
   }
   ~Person() {
     cancel_.emit(boost::asio::cancellation_type::terminal);
-    while (!over_ && io_.poll_one() > 0) {
+    while (!over_ && clock_.run_one()) {
     }
   }
   Person(const Person&) = delete;
   Person& operator=(const Person&) = delete;
 
   void type(std::string_view text) {
-    boost::asio::co_spawn(io_, write(std::string(text)), [](std::exception_ptr error) {
+    boost::asio::co_spawn(executor_, write(std::string(text)), [](std::exception_ptr error) {
       if (error) std::rethrow_exception(error);
     });
   }
@@ -69,7 +72,8 @@ class Person {
     (void)co_await wire_.b().write({bytes, text.size()});
   }
 
-  boost::asio::io_context& io_;
+  boost::asio::any_io_executor executor_;
+  sim::SimClock& clock_;
   sim::StreamWire wire_;
   boost::asio::cancellation_signal cancel_;
   std::string shown_;

@@ -55,7 +55,7 @@ class RecordedMission {
         survey_(ready_.config, ready_.site.map, ready_.tasks, 1,
                 {backend_.clock(), devices_, store_, progress_, compute_}) {
     bool ended = false;
-    boost::asio::co_spawn(backend_.io(), run(), [&](std::exception_ptr error) {
+    boost::asio::co_spawn(backend_.executor(), run(), [&](std::exception_ptr error) {
       ended = true;
       EXPECT_FALSE(error);
     });

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <boost/asio/co_spawn.hpp>
-#include <boost/asio/io_context.hpp>
 #include <fstream>
 #include <functional>
 #include <iterator>
@@ -162,13 +161,14 @@ class Mission {
         prepared_(prepared_for(yard, scenario)),
         rig_(yard, clock_, begin.stands),
         survey_(prepared_, 1, config(begin),
-                {io_, clock_, rig_.drivers(), run_.store, progress_, compute_, &journal_,
-                 run_.past ? &*run_.past : nullptr}),
+                {loop_.get_executor(), clock_, rig_.drivers(), run_.store, progress_, compute_,
+                 &journal_, run_.past ? &*run_.past : nullptr}),
         judge_(clock_, rig_, survey_, begin.after_cut) {
     if (scenario.at_console)
       operator_ = std::make_unique<OperatorAtConsole>(
           *scenario.at_console,
-          OperatorAtConsole::Parts{io_, clock_, compute_, survey_, rig_.drivers(), judge_},
+          OperatorAtConsole::Parts{loop_.get_executor(), clock_, compute_, survey_, rig_.drivers(),
+                                   judge_},
           begin.folder.parent_path());
   }
 
@@ -197,9 +197,8 @@ class Mission {
   const Scenario& scenario_;
   const Options options_;
   const Begin begin_;
-  // All of a mission runs on one thread.
-  boost::asio::io_context io_{BOOST_ASIO_CONCURRENCY_HINT_UNSAFE};
-  sim::SimClock clock_{io_};
+  sim::EventLoop loop_;
+  sim::SimClock clock_{loop_};
   WallClock wall_clock_;
   Disk disk_;
   ComputeOnDisk compute_{disk_, clock_};
@@ -358,13 +357,13 @@ hal::Task<void> Mission::tell_minutes() {
 void Mission::run_to_the_end() {
   rig_.bus().set_watch(
       [this](const hal::CanFrame& frame, bool to_unit) { judge_.on_frame(frame, to_unit); });
-  boost::asio::co_spawn(io_, fate(), rethrow);
-  boost::asio::co_spawn(io_, rig_.units().run(), rethrow);
+  boost::asio::co_spawn(loop_.get_executor(), fate(), rethrow);
+  boost::asio::co_spawn(loop_.get_executor(), rig_.units().run(), rethrow);
   survey_.start();
-  boost::asio::co_spawn(io_, person(), rethrow);
+  boost::asio::co_spawn(loop_.get_executor(), person(), rethrow);
   if (operator_) operator_->begin();
-  if (options_.observe) boost::asio::co_spawn(io_, observe(), rethrow);
-  if (options_.each_minute) boost::asio::co_spawn(io_, tell_minutes(), rethrow);
+  if (options_.observe) boost::asio::co_spawn(loop_.get_executor(), observe(), rethrow);
+  if (options_.each_minute) boost::asio::co_spawn(loop_.get_executor(), tell_minutes(), rethrow);
   const hal::Time late(options_.ends_within);
   clock_.run([&] {
     judge_.look();

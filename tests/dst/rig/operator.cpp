@@ -192,7 +192,7 @@ struct OperatorAtConsole::Console {
         overheard(robot, judge, [this] { look_at_password(); }),
         hub({.password = make_password(folder), .first_number = [] { return 1000U; }}, parts.clock,
             overheard, parts.compute),
-        person(parts.io, parts.clock, hub, console_test::kAtTheLine) {}
+        person(parts.executor, parts.clock, hub, console_test::kAtTheLine) {}
 
   // Once it was set only the new one logs anybody in, and whoever was logged in is so no more.
   void look_at_password() {
@@ -231,10 +231,10 @@ std::uint64_t OperatorAtConsole::hash() const {
 }
 
 void OperatorAtConsole::begin() {
-  boost::asio::co_spawn(parts_.io, types(), pass_on);
-  boost::asio::co_spawn(parts_.io, line(), pass_on);
-  boost::asio::co_spawn(parts_.io, reads(), pass_on);
-  boost::asio::co_spawn(parts_.io, helps(), pass_on);
+  boost::asio::co_spawn(parts_.executor, types(), pass_on);
+  boost::asio::co_spawn(parts_.executor, line(), pass_on);
+  boost::asio::co_spawn(parts_.executor, reads(), pass_on);
+  boost::asio::co_spawn(parts_.executor, helps(), pass_on);
 }
 
 bool OperatorAtConsole::password_set() const {

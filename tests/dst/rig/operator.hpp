@@ -2,12 +2,13 @@
 // line does to it.
 #pragma once
 
-#include <boost/asio/io_context.hpp>
+#include <boost/asio/any_io_executor.hpp>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "mission/main_console.hpp"
+#include "sim/sim_clock.hpp"
 #include "tests/dst/rig/judge.hpp"
 #include "tests/dst/rig/scenario.hpp"
 #include "tests/support/random_site.hpp"
@@ -27,8 +28,8 @@ Operator draw_operator(support::Dice& dice, double within_s);
 class OperatorAtConsole {
  public:
   struct Parts {
-    boost::asio::io_context& io;
-    hal::Clock& clock;
+    boost::asio::any_io_executor executor;
+    sim::SimClock& clock;
     hal::Compute& compute;
     mission::GuardedSurvey& survey;
     const mission::RobotDrivers& drivers;
