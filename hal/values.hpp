@@ -90,6 +90,17 @@ struct Beam {
   Eigen::Vector3f S_direction{1, 0, 0};
 };
 
+// How a scan's beams went, where one fan of them turned about S's z axis: shorter by far than beam
+// by beam, which is beams_of() in hal/pan_fan.hpp. Frame P is S turned with the pan axis.
+struct PanFan {
+  Eigen::Vector3d P_origin_m{0, 0, 0};
+  std::vector<Eigen::Vector3d> P_directions;  // Of each row.
+  double pan_per_row_rad{};                   // The axis goes on turning from row to row.
+  std::vector<double> pan_rad;                // At row 0 of each column.
+
+  std::size_t beams() const { return P_directions.size() * pan_rad.size(); }
+};
+
 // One 3-D scan. ranges_m[column * rows + row] is the range along that beam in metres; 0 says that
 // nothing came back, NaN that nothing is known: such a beam claims nothing.
 struct ScanCloud {
@@ -100,6 +111,8 @@ struct ScanCloud {
   // whose optics are beside the pan axis, keeps to the pattern only nearly. Empty: exactly the
   // pattern, all from the origin of S.
   std::vector<Beam> beams = {};
+  // Where it is there, `beams` are exactly its beams_of().
+  std::optional<PanFan> fan = {};
 };
 
 // One turn of a profile scanner's mirror, in the scanner's own frame L: x ahead, y left, beams in

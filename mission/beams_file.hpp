@@ -10,8 +10,9 @@
 
 namespace mission {
 
-// 80 bytes, and 28 a beam (4 where the scan keeps exactly to its pattern). Durable when it returns:
-// see write_file. Returns the checksum of all of it, which also stands in it.
+// 80 bytes, and 28 a beam; 4 a beam, and a few for each row and column, where the scan has a fan or
+// keeps exactly to its pattern. Durable when it returns: see write_file. Returns the checksum of
+// all of it, which also stands in it.
 FileResult<std::uint64_t> write_beams(const std::filesystem::path& path,
                                       const hal::ScanCloud& scan);
 

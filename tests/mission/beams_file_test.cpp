@@ -3,11 +3,13 @@
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 
+#include <cmath>
 #include <csignal>
 #include <cstring>
 #include <fstream>
 #include <limits>
 
+#include "hal/pan_fan.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace mission {
@@ -25,6 +27,25 @@ hal::ScanCloud scan_of(std::uint32_t columns, std::uint32_t rows, bool with_beam
   return scan;
 }
 
+hal::ScanCloud fan_scan_of(std::uint32_t columns, std::uint32_t rows) {
+  hal::ScanCloud scan = scan_of(columns, rows, false);
+  hal::PanFan& fan = scan.fan.emplace();
+  fan.P_origin_m << 0.1, -0.02, 0.3;
+  fan.pan_per_row_rad = 1e-5;
+  for (std::uint32_t row = 0; row < rows; ++row)
+    fan.P_directions.emplace_back(std::cos(0.01 * row), 0, std::sin(0.01 * row));
+  for (std::uint32_t column = 0; column < columns; ++column)
+    fan.pan_rad.push_back(-3 + 0.02 * column);
+  scan.beams = hal::beams_of(fan);
+  return scan;
+}
+
+bool same_fan(const std::optional<hal::PanFan>& a, const std::optional<hal::PanFan>& b) {
+  if (!a || !b) return !a && !b;
+  return a->P_origin_m == b->P_origin_m && a->P_directions == b->P_directions &&
+         a->pan_per_row_rad == b->pan_per_row_rad && a->pan_rad == b->pan_rad;
+}
+
 bool same_bits(const hal::ScanCloud& a, const hal::ScanCloud& b) {
   const auto same = [](const auto& x, const auto& y) {
     return x.size() == y.size() &&
@@ -34,7 +55,7 @@ bool same_bits(const hal::ScanCloud& a, const hal::ScanCloud& b) {
          a.pattern.rows == b.pattern.rows &&
          a.pattern.azimuth_step_rad == b.pattern.azimuth_step_rad &&
          a.pattern.elevation_first_rad == b.pattern.elevation_first_rad &&
-         same(a.ranges_m, b.ranges_m) && same(a.beams, b.beams);
+         same(a.ranges_m, b.ranges_m) && same(a.beams, b.beams) && same_fan(a.fan, b.fan);
 }
 
 // Not flushed: there are many.
@@ -55,6 +76,16 @@ TEST(BeamsFile, GivesBackWhatWasMeasuredBitForBit) {
   }
 }
 
+TEST(BeamsFile, KeepsAFanInsteadOfItsBeams) {
+  const test::TempFolder folder;
+  const auto path = folder.path() / "0001.beams";
+  const hal::ScanCloud scan = fan_scan_of(200, 300);
+  const std::uint64_t checksum = write_beams(path, scan).value();
+  EXPECT_TRUE(same_bits(read_beams(path, checksum).value(), scan));
+  EXPECT_TRUE(verify_beams(path, checksum));
+  EXPECT_EQ(std::filesystem::file_size(path), 80 + 4 * 200 * 300 + 8 * (4 + 3 * 300 + 200));
+}
+
 TEST(BeamsFile, TellsAnotherScanFromTheOneAskedFor) {
   const test::TempFolder folder;
   const auto path = folder.path() / "0001.beams";
@@ -66,10 +97,10 @@ TEST(BeamsFile, TellsAnotherScanFromTheOneAskedFor) {
 }
 
 // Every byte of a small one turned, and every shorter one.
-TEST(BeamsFile, FindsAnyByteThatIsNotWhatItWas) {
+void find_any_damage(const hal::ScanCloud& scan) {
   const test::TempFolder folder;
   const auto path = folder.path() / "0001.beams";
-  const std::uint64_t checksum = write_beams(path, scan_of(3, 2, true)).value();
+  const std::uint64_t checksum = write_beams(path, scan).value();
   const std::string whole = read_file(path).value();
   for (std::size_t i = 0; i < whole.size(); ++i) {
     std::string bytes = whole;
@@ -83,6 +114,11 @@ TEST(BeamsFile, FindsAnyByteThatIsNotWhatItWas) {
     EXPECT_FALSE(verify_beams(path, checksum)) << i;
     EXPECT_FALSE(read_beams(path, checksum)) << i;
   }
+}
+
+TEST(BeamsFile, FindsAnyByteThatIsNotWhatItWas) {
+  find_any_damage(scan_of(3, 2, true));
+  find_any_damage(fan_scan_of(3, 2));
 }
 
 TEST(BeamsFile, FindsAPageThatTheDiskLost) {
