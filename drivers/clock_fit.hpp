@@ -56,11 +56,16 @@ class ClockFit {
     std::int64_t device_ns{}, late_ns{};  // late = arrival - device - base
   };
   void clear();
-  void refit();
+  bool take(const Point& point);
+  void count(const Point& slice);
+  void extend_hull(const Point& slice);
+  void fit_line();
   double line_ns(std::int64_t device_ns) const;
 
   ClockFitLimits limits_;
   std::deque<Point> slices_;  // The least late of each slice, in order of device time.
+  std::vector<Point> hull_;   // Of the slices, the lower convex one: ends with the last.
+  double since_first_ns_{};   // Of all slices' times, the sum of what they are after the first's.
   std::int64_t base_ns_{};    // Keeps the differences small.
   std::optional<std::int64_t> last_device_ns_;
   std::int64_t last_arrival_ns_{};
