@@ -148,6 +148,7 @@ std::optional<ColaMessage> parse_cola(ByteView frame) {
 
 Bytes frame_cola(ColaDialect dialect, ByteView payload) {
   Bytes bytes;
+  bytes.reserve(kHeader + payload.size() + 1);
   if (dialect == ColaDialect::ascii) {
     bytes.push_back(kStx);
     bytes.insert(bytes.end(), payload.begin(), payload.end());

@@ -1,7 +1,6 @@
 #include "drivers/sick_lms.hpp"
 
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 namespace drivers {
@@ -297,14 +296,7 @@ void SickLms::add_profile(const LmsChannel& channel, hal::Time stamp, std::uint6
   profile.beam_period_s = beam_delay_s(scan_, channel, 1);
   profile.angle_first_rad = beam_angle_rad(channel, 0);
   profile.angle_step_rad = beam_angle_rad(channel, 1) - profile.angle_first_rad;
-  profile.ranges_m.reserve(channel.raw.size());
-  for (const std::uint16_t raw : channel.raw) {
-    const LmsRaw meaning = lms_raw_meaning(raw, config_.settings.lms5xx);
-    profile.ranges_m.push_back(
-        meaning == LmsRaw::range     ? static_cast<float>(lms_range_m(channel, raw))
-        : meaning == LmsRaw::nothing ? 0.0F
-                                     : std::numeric_limits<float>::quiet_NaN());
-  }
+  profile.ranges_m = lms_ranges_m(channel, config_.settings.lms5xx);
   for (const auto& rssi : scan_.channels16)
     if (rssi.label() == "RSSI1") profile.intensities.assign(rssi.raw.begin(), rssi.raw.end());
   profile.lost_before = lost;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace drivers {
@@ -189,6 +190,18 @@ LmsRaw lms_raw_meaning(std::uint16_t raw, bool lms5xx) {
 
 double lms_range_m(const LmsChannel& channel, std::uint16_t raw) {
   return (static_cast<double>(channel.scale) * raw + static_cast<double>(channel.offset)) / 1000.0;
+}
+
+std::vector<float> lms_ranges_m(const LmsChannel& channel, bool lms5xx) {
+  std::vector<float> ranges_m(channel.raw.size());
+  for (std::size_t i = 0; i < ranges_m.size(); ++i) {
+    const LmsRaw meaning = lms_raw_meaning(channel.raw[i], lms5xx);
+    if (meaning == LmsRaw::range)
+      ranges_m[i] = static_cast<float>(lms_range_m(channel, channel.raw[i]));
+    else if (meaning != LmsRaw::nothing)
+      ranges_m[i] = std::numeric_limits<float>::quiet_NaN();
+  }
+  return ranges_m;
 }
 
 std::vector<const Fault*> lms_faults(const LmsScan& scan) {

@@ -88,6 +88,8 @@ enum class LmsRaw { range, nothing, dazzled, implausible, filtered };
 // What a raw distance says, with LMS5xx's special values; LMS1xx knows `nothing` only.
 LmsRaw lms_raw_meaning(std::uint16_t raw, bool lms5xx);
 double lms_range_m(const LmsChannel& channel, std::uint16_t raw);
+// Of a whole channel as hal::Profile has them: 0 for nothing, NaN for what says nothing.
+std::vector<float> lms_ranges_m(const LmsChannel& channel, bool lms5xx);
 
 // Of a scan's status bytes.
 std::vector<const Fault*> lms_faults(const LmsScan& scan);

@@ -16,6 +16,18 @@ class BodyWriter {
   void u32(std::uint32_t value) { number(value); }
   void i32(std::int32_t value) { number(std::bit_cast<std::uint32_t>(value)); }
   void f32(float value) { number(std::bit_cast<std::uint32_t>(value)); }
+  template <class T>
+  void numbers(std::span<const std::uint16_t> values) {
+    if (dialect_ == ColaDialect::ascii) {
+      for (const auto value : values) number(static_cast<T>(value));
+      return;
+    }
+    const std::size_t at = payload_.size();
+    payload_.resize(at + sizeof(T) * values.size());
+    const auto into = std::span(payload_).subspan(at);
+    for (std::size_t i = 0; i < values.size(); ++i)
+      put_big<T>(into, sizeof(T) * i, static_cast<T>(values[i]));
+  }
   void characters(std::string_view text) {
     if (dialect_ == ColaDialect::ascii) payload_.push_back(' ');
     payload_.insert(payload_.end(), text.begin(), text.end());
@@ -67,7 +79,7 @@ void write_channels(BodyWriter& out, const std::vector<LmsChannel>& channels, bo
     out.i32(channel.start_1e4deg);
     out.u16(channel.step_1e4deg);
     out.u16(static_cast<std::uint16_t>(channel.raw.size()));
-    for (const auto raw : channel.raw) wide ? out.u16(raw) : out.u8(static_cast<std::uint8_t>(raw));
+    wide ? out.numbers<std::uint16_t>(channel.raw) : out.numbers<std::uint8_t>(channel.raw);
   }
 }
 

@@ -1,6 +1,7 @@
 #include "drivers/sick_lms_codec.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 #include <numeric>
 
@@ -271,6 +272,17 @@ TEST(SickLms, SpecialRawValuesAreNoRanges) {
   EXPECT_EQ(lms_raw_meaning(2, true), LmsRaw::implausible);
   EXPECT_EQ(lms_raw_meaning(3, true), LmsRaw::filtered);
   EXPECT_EQ(lms_raw_meaning(4, true), LmsRaw::range);
+  LmsChannel channel;
+  channel.scale = 2;
+  channel.offset = 500;
+  channel.raw = {0, 1, 3, 4, 65535};
+  const auto ranges_m = lms_ranges_m(channel, true);
+  ASSERT_EQ(ranges_m.size(), 5U);
+  EXPECT_EQ(ranges_m[0], 0);
+  EXPECT_TRUE(std::isnan(ranges_m[1]) && std::isnan(ranges_m[2]));
+  EXPECT_EQ(ranges_m[3], 0.508F);
+  EXPECT_EQ(ranges_m[4], 131.57F);
+  EXPECT_EQ(lms_ranges_m(channel, false), (std::vector{0.0F, 0.502F, 0.506F, 0.508F, 131.57F}));
 }
 
 TEST(SickLms, CountersTellRepeatedLostAndRestarted) {
