@@ -13,14 +13,21 @@ namespace {
 constexpr std::uint8_t kSync = 0xFA;
 constexpr std::size_t kPacketMax = 600;
 
-constexpr std::array<std::uint16_t, 256> make_crc16() {
-  std::array<std::uint16_t, 256> table{};
+// By how many bytes follow, for four at a time.
+using CrcTables = std::array<std::array<std::uint16_t, 256>, 4>;
+constexpr CrcTables make_crc16() {
+  CrcTables tables{};
   for (std::uint32_t byte = 0; byte < 256; ++byte) {
     std::uint32_t crc = byte << 8;
     for (int bit = 0; bit < 8; ++bit) crc = (crc & 0x8000) != 0 ? crc << 1 ^ 0x1021 : crc << 1;
-    table[byte] = static_cast<std::uint16_t>(crc);
+    tables[0][byte] = static_cast<std::uint16_t>(crc);
   }
-  return table;
+  for (std::size_t after = 1; after < 4; ++after)
+    for (std::size_t byte = 0; byte < 256; ++byte) {
+      const std::uint16_t crc = tables[after - 1][byte];
+      tables[after][byte] = static_cast<std::uint16_t>(crc << 8 ^ tables[0][crc >> 8]);
+    }
+  return tables;
 }
 constexpr auto kCrc16 = make_crc16();
 
@@ -138,12 +145,12 @@ bool for_each_field(ByteView frame, See&& see) {
   for (int group = 0; group < 8; ++group) {
     if ((frame[1] >> group & 1) == 0) continue;
     const auto fields = group_fields(group);
-    const auto bits = little<std::uint16_t>(frame, at);
+    std::uint32_t bits = little<std::uint16_t>(frame, at);
     at += 2;
-    for (std::size_t i = 0; i < 16; ++i) {
-      if ((bits >> i & 1) == 0) continue;
-      if (i >= fields.size()) return false;
-      see(fields[i]);
+    for (; bits != 0; bits &= bits - 1) {
+      const auto field = static_cast<std::size_t>(std::countr_zero(bits));
+      if (field >= fields.size()) return false;
+      see(fields[field]);
     }
   }
   return true;
@@ -234,8 +241,12 @@ std::optional<Vn100Vector> three(const std::vector<std::string>& fields, std::si
 
 std::uint16_t crc16_ccitt(ByteView bytes) {
   std::uint16_t crc = 0;
-  for (const std::uint8_t byte : bytes)
-    crc = static_cast<std::uint16_t>(crc << 8 ^ kCrc16[(crc >> 8 ^ byte) & 0xFF]);
+  std::size_t at = 0;
+  for (; at + 4 <= bytes.size(); at += 4)
+    crc = kCrc16[3][crc >> 8 ^ bytes[at]] ^ kCrc16[2][(crc & 0xFF) ^ bytes[at + 1]] ^
+          kCrc16[1][bytes[at + 2]] ^ kCrc16[0][bytes[at + 3]];
+  for (; at < bytes.size(); ++at)
+    crc = static_cast<std::uint16_t>(crc << 8 ^ kCrc16[0][crc >> 8 ^ bytes[at]]);
   return crc;
 }
 

@@ -6,6 +6,8 @@
 namespace drivers {
 namespace {
 
+constexpr std::size_t kSentMax = 64;  // A packet with all of kKnown has fewer bytes.
+
 void append(Bytes& bytes, const std::optional<Vn100Vector>& values) {
   for (const float value : values.value_or(Vn100Vector{})) append_little<float>(bytes, value);
 }
@@ -25,7 +27,9 @@ void append_fields(Bytes& bytes, std::uint16_t common, const Vn100Sample& sample
 Bytes encode_vn100_binary(std::uint16_t common, const Vn100Sample& sample) {
   constexpr std::uint16_t kKnown = 1U << 0 | 1U << 3 | 1U << 5 | 1U << 8 | 1U << 12;
   common &= kKnown;
-  Bytes packet{0xFA, 1};
+  Bytes packet;
+  packet.reserve(kSentMax);
+  packet.insert(packet.end(), {0xFA, 1});
   append_little<std::uint16_t>(packet, common);
   append_fields(packet, common, sample);
   append_big<std::uint16_t>(packet, crc16_ccitt(ByteView(packet).subspan(1)));

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <random>
 
 #include "tests/drivers/recordings.hpp"
 
@@ -202,6 +203,27 @@ TEST(Vn100, LinesAreReadWhole) {
   EXPECT_EQ(parse_vn100_line(bytes_of("$VNYPR,+010.071,+000.278,-002.026,S00A0*1F"))->status, 0xA0);
   EXPECT_FALSE(vn100_sample({"VNYPR", {"1", "x", "2"}, {}, {}}));
   EXPECT_FALSE(vn100_sample({"VNYPR", {"1", "2"}, {}, {}}));
+}
+
+// The sheet's: polynomial 0x1021 from 0, the highest bit first.
+std::uint16_t crc_bit_by_bit(ByteView bytes) {
+  std::uint32_t crc = 0;
+  for (const std::uint8_t byte : bytes) {
+    crc ^= static_cast<std::uint32_t>(byte) << 8;
+    for (int bit = 0; bit < 8; ++bit)
+      crc = (crc << 1 ^ ((crc & 0x8000) != 0 ? 0x1021 : 0)) & 0xFFFF;
+  }
+  return static_cast<std::uint16_t>(crc);
+}
+
+TEST(Vn100, TheCrcOfAnyLengthIsThatOfItsBits) {
+  EXPECT_EQ(crc16_ccitt(bytes_of("123456789")), 0x31C3);  // As catalogues of CRCs list it.
+  std::mt19937 random(1);
+  for (std::size_t size = 0; size < 600; ++size) {
+    Bytes bytes(size);
+    for (auto& byte : bytes) byte = static_cast<std::uint8_t>(random());
+    ASSERT_EQ(crc16_ccitt(bytes), crc_bit_by_bit(bytes)) << size;
+  }
 }
 
 TEST(Vn100, LinesMayEndInACrc) {
