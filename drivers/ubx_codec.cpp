@@ -211,7 +211,9 @@ std::optional<UbxAck> ubx_ack(const UbxMessage& m) {
 }
 
 Bytes encode_ubx(std::uint8_t cls, std::uint8_t id, ByteView payload) {
-  Bytes frame{0xB5, 0x62, cls, id};
+  Bytes frame;
+  frame.reserve(payload.size() + 8);
+  frame.insert(frame.end(), {0xB5, 0x62, cls, id});
   append_little<std::uint16_t>(frame, static_cast<std::uint16_t>(payload.size()));
   frame.insert(frame.end(), payload.begin(), payload.end());
   std::uint8_t a = 0, b = 0;
