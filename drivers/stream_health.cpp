@@ -39,17 +39,19 @@ void StreamHealth::judge(hal::Time now, const FrameReader& reader, Troubles& tro
   const auto bytes = static_cast<double>(reader.bytes() - now_.bytes);
   const auto damaged = static_cast<double>(reader.damaged_bytes() - now_.damaged);
   const double expected = span_s / limits_.period_s, came = static_cast<double>(now_.good);
-  troubles.set_if(damaged > kDamagedShare * bytes, fault::kDamaged,
-                  text("%.0f of %.0f bytes", damaged, bytes));
-  troubles.set_if(now_.repeated > 0, fault::kRepeated,
-                  text("%.0f in %.1f s", static_cast<double>(now_.repeated), span_s));
-  troubles.set_if(now_.implausible > 0, fault::kImplausible,
-                  text("%.0f in %.1f s", static_cast<double>(now_.implausible), span_s));
-  troubles.set_if(now_.latest_s > limits_.late_s, fault::kLate,
-                  text("by %.0f ms, %.0f are allowed", now_.latest_s * 1e3, limits_.late_s * 1e3));
+  const auto found = [&](bool present, const Fault& what, const char* format, double a, double b) {
+    troubles.set_if(present, what, present ? text(format, a, b) : std::string());
+  };
+  found(damaged > kDamagedShare * bytes, fault::kDamaged, "%.0f of %.0f bytes", damaged, bytes);
+  found(now_.repeated > 0, fault::kRepeated, "%.0f in %.1f s", static_cast<double>(now_.repeated),
+        span_s);
+  found(now_.implausible > 0, fault::kImplausible, "%.0f in %.1f s",
+        static_cast<double>(now_.implausible), span_s);
+  found(now_.latest_s > limits_.late_s, fault::kLate, "by %.0f ms, %.0f are allowed",
+        now_.latest_s * 1e3, limits_.late_s * 1e3);
   const bool slow =
       came > 0 && came + static_cast<double>(now_.implausible) < kSlowShare * expected;
-  troubles.set_if(slow, fault::kSlow, text("%.2f Hz, not %.2f", came / span_s, expected / span_s));
+  found(slow, fault::kSlow, "%.2f Hz, not %.2f", came / span_s, expected / span_s);
   restart(now, reader);
 }
 
