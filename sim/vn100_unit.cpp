@@ -48,6 +48,7 @@ void Vn100Unit::restart() {
                 {6, "14"},  // VNYMR
                 {7, "40"},
                 {75, "0,0,00"}};
+  read_registers();
   uart_.set_baud(config_.baud);
   paused_ = false;
   started_at_ = clock_.now();
@@ -102,6 +103,7 @@ std::string Vn100Unit::write_register(const drivers::Vn100Line& request, int reg
     return std::string("VNERR,") + (code < 10 ? "0" : "") + std::to_string(code);
   }
   registers_[reg] = values;
+  read_registers();
   return "VNWRG," + request.fields[0] + "," + values;
 }
 
@@ -113,18 +115,23 @@ int Vn100Unit::value_of(int reg, std::size_t field, int base) const {
   return whole_number<int>(drivers::take_field(rest, ','), base).value_or(0);
 }
 
+void Vn100Unit::read_registers() {
+  output_ = {value_of(75, 0) != 0, value_of(6, 0) == 14, value_of(75, 1), value_of(7, 0),
+             static_cast<std::uint16_t>(value_of(75, 3, 16))};
+}
+
 hal::Duration Vn100Unit::period() const {
   using std::chrono::seconds;
-  if (value_of(75, 0) != 0 && value_of(75, 1) > 0)
-    return hal::Duration(seconds(1)) * value_of(75, 1) / 800;
-  return hal::Duration(seconds(1)) / std::max(1, value_of(7, 0));
+  if (output_.binary && output_.divisor > 0)
+    return hal::Duration(seconds(1)) * output_.divisor / 800;
+  return hal::Duration(seconds(1)) / std::max(1, output_.lines_hz);
 }
 
 hal::Task<void> Vn100Unit::stream() {
   for (;;) {
     const hal::Duration every = faults_.slowed(period());
     co_await clock_.sleep_until(hal::Time((clock_.now().time_since_epoch() / every + 1) * every));
-    const bool speaks = value_of(75, 0) != 0 || value_of(6, 0) == 14;
+    const bool speaks = output_.binary || output_.lines;
     if (paused_ || !speaks || faults_.silent()) continue;
     const drivers::Bytes message = measure();
     const auto sent = co_await out_.write(message, kSampleKind);
@@ -152,9 +159,8 @@ drivers::Bytes Vn100Unit::measure() {
                        noisy(-kGravity_mps2, kAccelSigma_mps2)};
   sample.magnetic_gauss = {0.2F, 0, 0.4F};
   sample.vpe_status = config_.vpe_status;
-  if (value_of(75, 0) == 0) return drivers::encode_vn100_line(sample);
-  const auto common = static_cast<std::uint16_t>(value_of(75, 3, 16));
-  return drivers::encode_vn100_binary(common, sample);
+  return output_.binary ? drivers::encode_vn100_binary(output_.common, sample)
+                        : drivers::encode_vn100_line(sample);
 }
 
 }  // namespace sim

@@ -46,6 +46,7 @@ class Vn100Unit {
   std::string reply_to(const drivers::Vn100Line& request);
   std::string write_register(const drivers::Vn100Line& request, int reg);
   drivers::Bytes measure();
+  void read_registers();
   hal::Duration period() const;
   int value_of(int reg, std::size_t field, int base = 10) const;
 
@@ -57,6 +58,12 @@ class Vn100Unit {
   FaultyStream out_;
   NoiseStream noise_;                     // Of what the world does not tell.
   std::map<int, std::string> registers_;  // As they are read: "800" or "1,16,01,0029".
+  // What they say of the output.
+  struct {
+    bool binary{}, lines{};
+    int divisor{}, lines_hz{};
+    std::uint16_t common{};
+  } output_;
   bool paused_ = false;
   hal::Time started_at_{};
   int refuse_code_ = 0;
