@@ -6,8 +6,8 @@ namespace sim {
 namespace {
 
 double polynomial(const double* c, int count, double x) {
-  double sum = 0;
-  for (int i = 0; i < count; ++i) sum = sum * x + c[i];
+  double sum = c[0];
+  for (int i = 1; i < count; ++i) sum = sum * x + c[i];
   return sum;
 }
 
