@@ -4,6 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
+
+#include "hal/pan_fan.hpp"
 
 namespace drivers {
 namespace {
@@ -98,52 +101,62 @@ std::vector<Eigen::Vector3d> row_directions(const SweepPlan& plan, const Eigen::
   return directions;
 }
 
-struct Column {
-  const SweepPlan& plan;
-  const Eigen::Vector3d& P_origin_m;
-  const std::vector<Eigen::Vector3d>& P_directions;
-
-  // Row 0's pan angle, and how much the angle grows from row to row.
-  void aim(double pan_rad, double per_row_rad, hal::Beam* beams) const {
-    double c = std::cos(pan_rad), s = std::sin(pan_rad);
-    const double dc = std::cos(per_row_rad), ds = std::sin(per_row_rad);
-    for (std::uint32_t row = 0; row < plan.rows; ++row) {
-      const Eigen::Vector3d& d = P_directions[row];
-      beams[row].S_direction =
-          Eigen::Vector3d(c * d.x() - s * d.y(), s * d.x() + c * d.y(), d.z()).cast<float>();
-      beams[row].S_origin_m =
-          Eigen::Vector3d(c * P_origin_m.x() - s * P_origin_m.y(),
-                          s * P_origin_m.x() + c * P_origin_m.y(), P_origin_m.z())
-              .cast<float>();
-      const double turned = c * dc - s * ds;
-      s = s * dc + c * ds;
-      c = turned;
-    }
+// Column by column, each while it is in the cache.
+class CloudBuilder {
+ public:
+  CloudBuilder(const SweepPlan& plan, const Eigen::Isometry3d& T_P_L, const hal::Profile& like,
+               double per_row_rad, const hal::ScanPattern& pattern)
+      : plan_(plan),
+        fan_{T_P_L.translation(), row_directions(plan, T_P_L, like), per_row_rad, {}},
+        aim_(fan_) {
+    cloud_.pattern = pattern;
+    fan_.pan_rad.reserve(pattern.columns);
+    cloud_.ranges_m.reserve(pattern.beams());
+    cloud_.beams.reserve(pattern.beams());
   }
-  void fill(const hal::Profile& profile, float* ranges_m) const {
-    std::int64_t beam = plan.beam_first;
-    for (std::uint32_t row = 0; row < plan.rows; ++row, beam += plan.beam_step)
-      ranges_m[row] = profile.ranges_m[static_cast<std::size_t>(beam)];
+  CloudBuilder(const CloudBuilder&) = delete;
+  CloudBuilder& operator=(const CloudBuilder&) = delete;
+
+  // Row 0's pan angle; without a profile that fits nothing is known.
+  void add(double pan_rad, const hal::Profile* profile) {
+    const std::size_t at = cloud_.beams.size();
+    fan_.pan_rad.push_back(pan_rad);
+    cloud_.beams.resize(at + plan_.rows);
+    cloud_.ranges_m.resize(at + plan_.rows, kNoClaim);
+    aim_.column(pan_rad, std::span(cloud_.beams).last(plan_.rows));
+    if (profile != nullptr && fits(*profile)) fill(*profile, &cloud_.ranges_m[at]);
   }
   bool fits(const hal::Profile& profile) const {
-    const std::int64_t last = plan.beam_first + std::int64_t{plan.rows - 1} * plan.beam_step;
+    const std::int64_t last = plan_.beam_first + std::int64_t{plan_.rows - 1} * plan_.beam_step;
     const auto size = static_cast<std::int64_t>(profile.ranges_m.size());
-    return last >= 0 && last < size && plan.beam_first < size;
+    return last >= 0 && last < size && plan_.beam_first < size;
   }
+  hal::ScanCloud built() {
+    cloud_.fan = std::move(fan_);
+    return std::move(cloud_);
+  }
+
+ private:
+  void fill(const hal::Profile& profile, float* ranges_m) const {
+    std::int64_t beam = plan_.beam_first;
+    for (std::uint32_t row = 0; row < plan_.rows; ++row, beam += plan_.beam_step)
+      ranges_m[row] = profile.ranges_m[static_cast<std::size_t>(beam)];
+  }
+
+  const SweepPlan& plan_;
+  hal::PanFan fan_;
+  hal::FanAim aim_;
+  hal::ScanCloud cloud_;
 };
 
-hal::ScanCloud empty_cloud(const SweepPlan& plan, double azimuth_first_rad, double azimuth_step_rad,
-                           std::uint32_t columns) {
-  hal::ScanCloud cloud;
-  cloud.pattern = {azimuth_first_rad + plan.azimuth_offset_rad,
-                   azimuth_step_rad,
-                   plan.elevation_first_rad,
-                   plan.elevation_step_rad,
-                   columns,
-                   plan.rows};
-  cloud.ranges_m.assign(cloud.pattern.beams(), kNoClaim);
-  cloud.beams.resize(cloud.pattern.beams());
-  return cloud;
+hal::ScanPattern pattern_of(const SweepPlan& plan, double azimuth_first_rad,
+                            double azimuth_step_rad, std::uint32_t columns) {
+  return {azimuth_first_rad + plan.azimuth_offset_rad,
+          azimuth_step_rad,
+          plan.elevation_first_rad,
+          plan.elevation_step_rad,
+          columns,
+          plan.rows};
 }
 
 hal::Time last_beam(const hal::Profile& profile) {
@@ -284,14 +297,11 @@ SweepCloud assemble_sweep(const SweepPlan& plan, const Eigen::Isometry3d& T_P_L,
   const double step = columns == 1 ? plan.pan_step_rad
                                    : (placed.back().pan_rad - placed.front().pan_rad) /
                                          static_cast<double>(columns - 1);
-  sweep.cloud = empty_cloud(plan, placed.front().pan_rad, step, columns);
-  const Eigen::Vector3d P_origin_m = T_P_L.translation();
-  const auto directions = row_directions(plan, T_P_L, *placed.front().profile);
-  const Column column{plan, P_origin_m, directions};
+  const double per_beam = pan.rate_radps * placed.front().profile->beam_period_s;
+  CloudBuilder cloud(plan, T_P_L, *placed.front().profile, per_beam * plan.beam_step,
+                     pattern_of(plan, placed.front().pan_rad, step, columns));
   std::size_t next = 0;
   for (std::uint32_t c = 0; c < columns; ++c) {
-    const std::size_t at = std::size_t{c} * plan.rows;
-    const double per_beam = pan.rate_radps * placed.front().profile->beam_period_s;
     while (next < placed.size() && placed[next].column < c) ++next;
     const hal::Profile* const profile =
         next < placed.size() && placed[next].column == c ? placed[next].profile : nullptr;
@@ -299,10 +309,9 @@ SweepCloud assemble_sweep(const SweepPlan& plan, const Eigen::Isometry3d& T_P_L,
         profile ? pan.angle_at(profile->stamp + late)
                 : placed.front().pan_rad + c * step -
                       per_beam * static_cast<double>(placed.front().profile->ranges_m.size()) / 2;
-    column.aim(first_beam + per_beam * plan.beam_first, per_beam * plan.beam_step,
-               &sweep.cloud.beams[at]);
-    if (profile && column.fits(*profile)) column.fill(*profile, &sweep.cloud.ranges_m[at]);
+    cloud.add(first_beam + per_beam * plan.beam_first, profile);
   }
+  sweep.cloud = cloud.built();
   sweep.cloud.stamp = last_beam(*placed.back().profile);
   return sweep;
 }
@@ -312,20 +321,19 @@ SweepCloud assemble_stops(const SweepPlan& plan, const Eigen::Isometry3d& T_P_L,
   SweepCloud sweep;
   const auto some = std::find_if(stops.begin(), stops.end(), [](const auto& s) { return !s.lost; });
   if (some == stops.end()) return sweep;
-  sweep.cloud = empty_cloud(plan, plan.pan_first_rad, plan.pan_step_rad,
-                            static_cast<std::uint32_t>(stops.size()));
-  const Eigen::Vector3d P_origin_m = T_P_L.translation();
-  const auto directions = row_directions(plan, T_P_L, some->profile);
-  const Column column{plan, P_origin_m, directions};
+  CloudBuilder cloud(plan, T_P_L, some->profile, 0,
+                     pattern_of(plan, plan.pan_first_rad, plan.pan_step_rad,
+                                static_cast<std::uint32_t>(stops.size())));
+  hal::Time last{};
   sweep.quality.columns = static_cast<std::uint32_t>(stops.size());
-  for (std::size_t c = 0; c < stops.size(); ++c) {
-    const bool lost = stops[c].lost || !column.fits(stops[c].profile);
-    column.aim(stops[c].pan_rad, 0, &sweep.cloud.beams[c * plan.rows]);
+  for (const StoppedProfile& stop : stops) {
+    const bool lost = stop.lost || !cloud.fits(stop.profile);
+    cloud.add(stop.pan_rad, lost ? nullptr : &stop.profile);
     sweep.quality.columns_lost += lost;
-    if (lost) continue;
-    column.fill(stops[c].profile, &sweep.cloud.ranges_m[c * plan.rows]);
-    sweep.cloud.stamp = std::max(sweep.cloud.stamp, last_beam(stops[c].profile));
+    if (!lost) last = std::max(last, last_beam(stop.profile));
   }
+  sweep.cloud = cloud.built();
+  sweep.cloud.stamp = last;
   return sweep;
 }
 
