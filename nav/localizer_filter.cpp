@@ -1,7 +1,6 @@
 #include "nav/localizer_filter.hpp"
 
 #include <Eigen/Geometry>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -24,18 +23,6 @@ bool usable(double sigma) {
 
 double gate_of(const LocalizerConfig& config, int numbers) {
   return numbers == 1 ? config.gate1_chi2 : numbers == 2 ? config.gate_chi2 : config.gate3_chi2;
-}
-
-// Products of these sizes are the plain sums anyway: lazyProduct says so at once, where operator*
-// makes the compiler weigh every way there is (three quarters of this file's time).
-
-using UpTo3 = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1>;
-using UpTo3x3 = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3>;
-
-UpTo3x3 inverse(const UpTo3x3& S) {
-  Eigen::Matrix3d full = Eigen::Matrix3d::Identity();
-  full.topLeftCorner(S.rows(), S.cols()) = S;
-  return full.inverse().topLeftCorner(S.rows(), S.cols());
 }
 
 }  // namespace
@@ -66,6 +53,8 @@ Gate LocalizerFilter::apply(const LocalizerConfig& config, const LocalizerEvent&
   return gate;
 }
 
+// lazyProduct is the plain sums at once, where operator* makes the compiler weigh every way there
+// is.
 LocalizerFilter LocalizerFilter::with(const Hindsight& later) const {
   LocalizerFilter known = *this;
   known.correct(-covariance_.lazyProduct(later.pull()));
@@ -111,7 +100,8 @@ Gate LocalizerFilter::take(const LocalizerConfig& config, const GnssPosition& fi
   const Eigen::Vector2d innovation = fix.position_m - (position_m_ + W_arm).head<2>() -
                                      wanders.cwiseProduct(wander_) - ahead_m(fix.stamp);
 
-  Gate gate = update(config, Source::gnss_position, fix.stamp, {H.transpose(), innovation, white});
+  const Measurement<2> measured{H.transpose(), innovation, white};
+  const Gate gate = update(config, Source::gnss_position, fix.stamp, measured);
   if (gate == Gate::accepted) {
     agreeing_.reset();
     return gate;
@@ -122,7 +112,7 @@ Gate LocalizerFilter::take(const LocalizerConfig& config, const GnssPosition& fi
   covariance_.topLeftCorner<2, 2>() += off_m2 * Eigen::Matrix2d::Identity();
   // It went astray over the way of the streak: so may have its heading.
   covariance_(kHeading, kHeading) += std::min(off_m2 / std::pow(config.lost_after_m, 2), 1.0);
-  absorb({H.transpose(), innovation, white});
+  absorb(measured);
   agreeing_.reset();
   note(Source::gnss_position, fix.stamp, false);
   return Gate::reset;
@@ -155,9 +145,9 @@ Gate LocalizerFilter::take(const LocalizerConfig& config, const GnssVelocity& fi
   H.col(kSlipLeft) = -side_speed_mps_[0] / 2 * R_W_B_.col(0).head<2>();
   H.col(kSlipRight) = -side_speed_mps_[1] / 2 * R_W_B_.col(0).head<2>();
   const double variance = std::pow(fix.sigma_mps, 2) + std::pow(config.gnss_velocity_floor_mps, 2);
-  return update(config, Source::gnss_velocity, fix.stamp,
-                {H.transpose(), fix.velocity_mps - (W_speed + W_swing).head<2>(),
-                 variance * Eigen::Matrix2d::Identity()});
+  return update<2>(config, Source::gnss_velocity, fix.stamp,
+                   {H.transpose(), fix.velocity_mps - (W_speed + W_swing).head<2>(),
+                    variance * Eigen::Matrix2d::Identity()});
 }
 
 Gate LocalizerFilter::take(const LocalizerConfig& config, const PoseFix& fix) {
@@ -169,8 +159,8 @@ Gate LocalizerFilter::take(const LocalizerConfig& config, const PoseFix& fix) {
   Eigen::Vector3d innovation;
   innovation << fix.pose.position_m - position_m_.head<2>() - ahead_m(fix.stamp),
       hal::wrapped(fix.pose.heading_rad - heading_of(R_W_B_));
-  const Gate gate =
-      update(config, Source::pose_fix, fix.stamp, {H.transpose(), innovation, fix.covariance});
+  const Measurement<3> measured{H.transpose(), innovation, fix.covariance};
+  const Gate gate = update(config, Source::pose_fix, fix.stamp, measured);
   if (gate == Gate::accepted) {
     move_ = {};
     return gate;
@@ -179,7 +169,7 @@ Gate LocalizerFilter::take(const LocalizerConfig& config, const PoseFix& fix) {
   covariance_.topLeftCorner<2, 2>() +=
       innovation.head<2>().squaredNorm() * Eigen::Matrix2d::Identity();
   covariance_(kHeading, kHeading) += innovation[2] * innovation[2];
-  absorb({H.transpose(), innovation, fix.covariance});
+  absorb(measured);
   move_ = {};
   note(Source::pose_fix, fix.stamp, false);
   return Gate::reset;
@@ -213,9 +203,9 @@ Gate LocalizerFilter::take(const LocalizerConfig& config, const LandmarkSighting
       sighting.range_m - range_m,
       hal::wrapped(sighting.bearing_rad - std::atan2(way.y(), way.x()) + heading_of(R_W_B_)));
   const Eigen::Vector2d sigmas(sighting.range_sigma_m, sighting.bearing_sigma_rad);
-  const Gate gate =
-      update(config, Source::landmark, sighting.stamp,
-             {H.transpose(), innovation, sigmas.cwiseAbs2().asDiagonal()}, stale(config, sighting));
+  const Gate gate = update<2>(config, Source::landmark, sighting.stamp,
+                              {H.transpose(), innovation, sigmas.cwiseAbs2().asDiagonal()},
+                              stale(config, sighting));
   if (gate == Gate::accepted && config.landmark_wander_s > 0) remember(sighting);
   return gate;
 }
@@ -251,38 +241,31 @@ Gate LocalizerFilter::take(const LocalizerConfig& config, const BeaconRange& ran
   Rows<1> H = Rows<1>::Zero();
   H.middleCols<2>(kP) = reads * way.transpose() / range_m;
   H(0, kBeaconScale) = range_m;
-  return update(config, Source::beacon, range.stamp,
-                {H.transpose(), Eigen::Matrix<double, 1, 1>(range.range_m - reads * range_m),
-                 Eigen::Matrix<double, 1, 1>(range.sigma_m * range.sigma_m)});
+  return update<1>(config, Source::beacon, range.stamp,
+                   {H.transpose(), Eigen::Matrix<double, 1, 1>(range.range_m - reads * range_m),
+                    Eigen::Matrix<double, 1, 1>(range.sigma_m * range.sigma_m)});
 }
 
+template <int N>
 Gate LocalizerFilter::update(const LocalizerConfig& config, Source source, hal::Time stamp,
-                             const Measured& m, double stale) {
-  const UpTo3x3 S = m.Ht.transpose().lazyProduct(Tall(covariance_.lazyProduct(m.Ht))) + m.R;
-  last_nis_ = m.innovation.dot(UpTo3(inverse(S).lazyProduct(m.innovation)));
-  last_dimension_ = static_cast<int>(m.innovation.size());
-  const bool refused = !(last_nis_ <= gate_of(config, last_dimension_));
+                             const Measurement<N>& m, double stale) {
+  const Expected<N> expected = nav::expected<N>(covariance_, m.Ht);
+  last_nis_ = squared(m, expected);
+  last_dimension_ = N;
+  const bool refused = !(last_nis_ <= gate_of(config, N));
   note(source, stamp, refused);
   if (refused) return Gate::rejected;
-  absorb({m.Ht, m.innovation, stale * m.R});
+  absorb<N>({m.Ht, m.innovation, stale * m.R}, expected);
   return Gate::accepted;
 }
 
-// Joseph's form: stays symmetric and positive.
-void LocalizerFilter::absorb(const Measured& m) {
-  const Tall PHt = covariance_.lazyProduct(m.Ht);
-  const UpTo3x3 S = m.Ht.transpose().lazyProduct(PHt) + m.R;
-  const UpTo3x3 S_inverse = inverse(S);
-  const Tall K = PHt.lazyProduct(S_inverse);
-  if (tape_) tape_->measured(m.Ht, m.innovation, S_inverse, K);
-  correct(K.lazyProduct(m.innovation));
-  // (I - K H) P (I - K H)' + K R K', with the products that are small.
-  Matrix A = covariance_;
-  A -= K.lazyProduct(PHt.transpose());
-  const Tall B = K.lazyProduct(m.R) - Tall(A.lazyProduct(m.Ht));
-  A += B.lazyProduct(K.transpose());
-  covariance_ = (A + A.transpose()) / 2;
+template <int N>
+void LocalizerFilter::absorb(const Measurement<N>& m, const Expected<N>& expected) {
+  const Learnt<N> learnt = learn(covariance_, m, expected);
+  if (tape_) tape_->measured(m.Ht, m.innovation, learnt.S_inverse, learnt.K);
+  correct(learnt.error);
 }
+template void LocalizerFilter::absorb(const Measurement<2>& m, const Expected<2>& expected);
 
 // Moves the error into the state.
 void LocalizerFilter::correct(const State& error) {
@@ -309,8 +292,12 @@ void LocalizerFilter::note(Source source, hal::Time stamp, bool refused) {
   streak.last = stamp;
 }
 
-hal::Pose2 LocalizerFilter::pose() const {
-  return {position_m_.head<2>(), heading_of(R_W_B_)};
+hal::Pose2 FilterPose::pose() const {
+  return {position_m, std::atan2(along.y(), along.x())};
+}
+
+FilterPose LocalizerFilter::filter_pose() const {
+  return {position_m_.head<2>(), R_W_B_.col(0).head<2>(), travel_time_, speed_mps_, turn_radps_};
 }
 
 Eigen::Isometry3d LocalizerFilter::T_W_B() const {

@@ -6,7 +6,7 @@
 #include <array>
 #include <optional>
 
-#include "nav/hindsight.hpp"
+#include "nav/error_covariance.hpp"
 #include "nav/localizer_inputs.hpp"
 
 namespace nav {
@@ -82,6 +82,16 @@ struct RefusalStreak {
   hal::Time first{}, last{};
 };
 
+// Where a filter has the robot, and how that goes on.
+struct FilterPose {
+  Eigen::Vector2d position_m{0, 0};
+  Eigen::Vector2d along{1, 0};  // The body's x axis in W, as it lies in the plane: not of length 1.
+  std::optional<hal::Time> moved_until;
+  double speed_mps{}, turn_radps{};
+
+  hal::Pose2 pose() const;  // Heading in (-pi, pi].
+};
+
 class LocalizerFilter {
  public:
   LocalizerFilter(const LocalizerConfig& config, const hal::Pose2& start,
@@ -94,7 +104,8 @@ class LocalizerFilter {
   // As it would be, had it known at that time what came later.
   LocalizerFilter with(const Hindsight& later) const;
 
-  hal::Pose2 pose() const;             // Heading in (-pi, pi].
+  FilterPose filter_pose() const;
+  hal::Pose2 pose() const { return filter_pose().pose(); }
   Eigen::Isometry3d T_W_B() const;     // With slope and height above the start.
   Eigen::Matrix3d covariance() const;  // Of (x, y, heading), in W.
   Eigen::Vector3d gyro_bias_radps() const { return bias_radps_; }
@@ -192,18 +203,17 @@ class LocalizerFilter {
   bool lost(const LocalizerConfig& config, const PoseFix& fix);
   Eigen::Vector2d ahead_m(hal::Time stamp) const;
   void correct(const State& error);
-  using Tall = Eigen::Matrix<double, kSize, Eigen::Dynamic, 0, kSize, 3>;
-  // One to three numbers, how they depend on the state (transposed), and their covariance.
-  struct Measured {
-    Tall Ht;
-    Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1> innovation;
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3> R;
-  };
   // stale: the error that it has in common with what was measured before takes away from what it
   // tells as if its covariance were so many times larger.
-  Gate update(const LocalizerConfig& config, Source source, hal::Time stamp, const Measured& m,
-              double stale = 1);
-  void absorb(const Measured& m);
+  template <int N>
+  Gate update(const LocalizerConfig& config, Source source, hal::Time stamp,
+              const Measurement<N>& m, double stale = 1);
+  template <int N>
+  void absorb(const Measurement<N>& m, const Expected<N>& expected);
+  template <int N>
+  void absorb(const Measurement<N>& m) {
+    absorb(m, expected<N>(covariance_, m.Ht));
+  }
   void note(Source source, hal::Time stamp, bool refused);
   double stale(const LocalizerConfig& config, const LandmarkSighting& sighting) const;
   void remember(const LandmarkSighting& sighting);

@@ -130,33 +130,28 @@ void LocalizerFilter::move(const LocalizerConfig& config, const hal::WheelTravel
   const Eigen::Matrix3d R_mid = R_W_B_ * rotation_of(turned / 2);
   const Eigen::Vector3d W_step_m = forward_m * R_mid.col(0);
   const Eigen::Matrix3d swings = -cross_matrix(W_step_m);
-  // How the turn (in the body) and the step depend on the state.
-  Rows<3> turn_by = Rows<3>::Zero();
-  turn_by(2, kBias + 2) = -turn.span_s;
-  if (knows_tilt_) turn_by(0, kBias) = turn_by(1, kBias + 1) = -turn.span_s;
-  turn_by(2, kSlipLeft) = by_slip[0] - turn.told.by_slip[0];
-  turn_by(2, kSlipRight) = by_slip[1] - turn.told.by_slip[1];
-  const Rows<3> W_turn_by = R_mid.lazyProduct(turn_by);
-  Rows<3> step_by = (swings / 2).lazyProduct(W_turn_by);
-  step_by.middleCols<3>(kTheta) += swings;
-  step_by.col(kSlipLeft) -= travel.left_m / 2 * R_mid.col(0);
-  step_by.col(kSlipRight) -= travel.right_m / 2 * R_mid.col(0);
+  const Eigen::Vector2d slip_turns = by_slip - turn.told.by_slip;
+  // How the turn and the step depend on the state.
+  Motion motion = Motion::Zero();
+  auto W_turn_by = motion.bottomRows<3>();
+  for (int axis = knows_tilt_ ? 0 : 2; axis < 3; ++axis)
+    W_turn_by.col(kBias + axis - kMotionFrom) = R_mid.col(axis) * -turn.span_s;
+  W_turn_by.col(kSlipLeft - kMotionFrom) = R_mid.col(2) * slip_turns[0];
+  W_turn_by.col(kSlipRight - kMotionFrom) = R_mid.col(2) * slip_turns[1];
+  auto step_by = motion.topRows<3>();
+  step_by = (swings / 2).lazyProduct(Eigen::Matrix<double, 3, 8>(W_turn_by));
+  step_by.leftCols<3>() = swings;
+  step_by.col(kSlipLeft - kMotionFrom) -= travel.left_m / 2 * R_mid.col(0);
+  step_by.col(kSlipRight - kMotionFrom) -= travel.right_m / 2 * R_mid.col(0);
 
   position_m_ += W_step_m;
   R_W_B_ = Eigen::Quaterniond(R_W_B_ * rotation_of(turned)).normalized().toRotationMatrix();
   if (tape_) {
     Matrix F = Matrix::Identity();
-    F.middleRows<3>(kP) += step_by;
-    F.middleRows<3>(kTheta) += W_turn_by;
+    F.block<6, 8>(kP, kMotionFrom) += motion;
     tape_->moved(F);
   }
-  // F is the identity but for these six rows.
-  Matrix FP = covariance_;
-  FP.middleRows<3>(kP) += step_by.lazyProduct(covariance_);
-  FP.middleRows<3>(kTheta) += W_turn_by.lazyProduct(covariance_);
-  covariance_ = FP;
-  covariance_.middleCols<3>(kP) += FP.lazyProduct(step_by.transpose());
-  covariance_.middleCols<3>(kTheta) += FP.lazyProduct(W_turn_by.transpose());
+  carry(covariance_, motion, knows_tilt_);
 
   covariance_(kHeading, kHeading) +=
       turn.variance + std::pow(config.wheel_turn_error * wheel_turn_rad, 2);
@@ -224,7 +219,7 @@ void LocalizerFilter::level(const LocalizerConfig& config, const Turn& turn, dou
   const double variance =
       std::pow(config.accel_tilt_sigma_rad, 2) * std::max(1.0, config.accel_wander_s / span_s) +
       std::pow(0.1 * accel_mps2 / kGravity_mps2, 2);
-  absorb({H.transpose(), innovation, variance * Eigen::Matrix2d::Identity()});
+  absorb<2>({H.transpose(), innovation, variance * Eigen::Matrix2d::Identity()});
 }
 
 }  // namespace nav
