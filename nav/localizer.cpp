@@ -3,45 +3,10 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
-#include <numbers>
 #include <utility>
 
 namespace nav {
 namespace {
-
-constexpr double kAhead_s = 0.5;
-
-// Of two events of one stamp, the kind that goes first; of one kind, what came first.
-bool before(hal::Time stamp, const LocalizerEvent& event, hal::Time other,
-            const LocalizerEvent& other_event) {
-  return stamp != other ? stamp < other : event.index() < other_event.index();
-}
-
-hal::Pose2 between(const LocalizerFilter& from, const LocalizerFilter& to, hal::Time stamp) {
-  hal::Pose2 pose = from.pose();
-  if (!from.moved_until()) return pose;
-  const double span_s = hal::seconds(*to.moved_until() - *from.moved_until());
-  const double share =
-      std::clamp(hal::seconds(stamp - *from.moved_until()) / std::max(1e-9, span_s), 0.0, 1.0);
-  const hal::Pose2 next = to.pose();
-  pose.position_m += share * (next.position_m - pose.position_m);
-  pose.heading_rad +=
-      share * std::remainder(next.heading_rad - pose.heading_rad, 2 * std::numbers::pi);
-  return pose;
-}
-
-hal::Pose2 ahead(const LocalizerFilter& from, hal::Time stamp) {
-  hal::Pose2 pose = from.pose();
-  if (!from.moved_until()) return pose;
-  const double span_s = std::clamp(hal::seconds(stamp - *from.moved_until()), 0.0, kAhead_s);
-  const double turn_rad = span_s * from.turn_radps();
-  const double along = pose.heading_rad + turn_rad / 2;
-  pose.position_m += span_s * from.speed_mps() * Eigen::Vector2d(std::cos(along), std::sin(along));
-  pose.heading_rad = std::remainder(pose.heading_rad + turn_rad, 2 * std::numbers::pi);
-  return pose;
-}
 
 std::string_view remedy(Source source) {
   switch (source) {
@@ -80,12 +45,18 @@ std::string_view name(Source source) {
 
 Localizer::Localizer(const LocalizerConfig& config, const hal::Pose2& start,
                      const Eigen::Matrix3d& covariance)
-    : config_(config),
-      final_{Entry{{}, InertialSample{}, LocalizerFilter(config, start, covariance)}},
-      filter_(final_.front().after) {}
+    : config_(config), history_(config, start, covariance) {}
 
 void Localizer::predict(const hal::ImuSample& sample) {
   add(InertialSample{sample.stamp, {0, 0, sample.yaw_rate_radps}, {}});
+}
+
+void Localizer::predict(const hal::WheelTravel& travel) {
+  settled();
+  if (history_.ends_with(travel))
+    waiting_ = travel;
+  else
+    history_.add(travel);
 }
 
 Gate Localizer::correct(const hal::GnssFix& fix) {
@@ -96,73 +67,23 @@ Gate Localizer::correct(const hal::GnssFix& fix) {
 }
 
 Correction Localizer::add(const LocalizerEvent& event) {
-  const hal::Time stamp = stamp_of(event);
-  if (final_until_ && stamp < *final_until_) return {Gate::rejected, true, 0, 0};
-  const auto after = [&](const Entry& entry) {
-    return before(stamp, event, entry.stamp, entry.event);
-  };
-  // Most come in order: look from the end.
-  auto at = history_.end();
-  while (at != history_.begin() && after(*std::prev(at))) --at;
-  const bool latest = at == history_.end();  // The filter is that of the last entry already.
-  if (!latest) filter_ = at == history_.begin() ? final_.front().after : std::prev(at)->after;
-  Correction correction;
-  const bool gated = nav::gated(event);
-  correction.gate = filter_.apply(config_, event);
-  if (gated) {
-    correction.nis = filter_.last_nis();
-    correction.dimension = filter_.last_dimension();
-  }
-  for (at = std::next(keep(at, stamp, event)); at != history_.end(); ++at) {
-    filter_.apply(config_, at->event);
-    at->after = filter_;
-  }
-  forget(history_.back().stamp);
-  return correction;
+  // Of the same stamp: so that whether it is too late does not depend on what waits.
+  const bool first = waiting_ && std::holds_alternative<InertialSample>(event) &&
+                     stamp_of(event) == waiting_->stamp;
+  if (!first) settled();
+  return history_.add(event);
 }
 
-// With the filter as it is now.
-std::list<Localizer::Entry>::iterator Localizer::keep(std::list<Entry>::const_iterator before,
-                                                      hal::Time stamp,
-                                                      const LocalizerEvent& event) {
-  if (spare_.empty()) return history_.insert(before, Entry{stamp, event, filter_});
-  const auto kept = spare_.begin();
-  history_.splice(before, spare_, kept);
-  kept->stamp = stamp;
-  kept->event = event;
-  kept->after = filter_;
-  return kept;
-}
-
-void Localizer::forget(hal::Time now) {
-  const hal::Time oldest = now - hal::from_seconds(config_.history_s);
-  while (history_.size() > 1 &&
-         (history_.front().stamp < oldest || history_.size() > config_.history_max)) {
-    final_until_ = history_.front().stamp;
-    spare_.splice(spare_.begin(), final_);
-    final_.splice(final_.begin(), history_, history_.begin());
-  }
-}
-
-// Poses stand where travel reports end: between two of them the way is cut in proportion.
-hal::Pose2 Localizer::pose_at(hal::Time stamp) const {
-  const LocalizerFilter* from = &final_.front().after;
-  for (const Entry& entry : history_) {
-    if (!std::holds_alternative<hal::WheelTravel>(entry.event)) {
-      if (entry.stamp <= stamp) from = &entry.after;  // Corrected since.
-      continue;
-    }
-    if (entry.stamp > stamp) return between(*from, entry.after, stamp);
-    from = &entry.after;
-  }
-  return ahead(*from, stamp);
+const LocalizerHistory& Localizer::settled() const {
+  if (waiting_) history_.add(*std::exchange(waiting_, {}));
+  return history_;
 }
 
 std::vector<LocalizerFault> Localizer::faults() const {
   std::vector<LocalizerFault> faults;
   for (std::size_t i = 0; i < kSources; ++i) {
     const auto source = static_cast<Source>(i);
-    const RefusalStreak& streak = filter_.refusals(source);
+    const RefusalStreak& streak = settled().filter().refusals(source);
     if (streak.count < config_.streak_fault ||
         hal::seconds(streak.last - streak.first) < config_.streak_fault_s)
       continue;

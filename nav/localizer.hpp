@@ -5,14 +5,13 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <list>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "hal/values.hpp"
-#include "nav/localizer_filter.hpp"
+#include "nav/localizer_history.hpp"
 
 namespace nav {
 
@@ -24,14 +23,6 @@ struct LocalizerFault {
   int count{};
   double since_s{};  // Robot's clock.
   std::string text;  // What, and what to do.
-};
-
-// What a localizer did with a measurement.
-struct Correction {
-  Gate gate = Gate::rejected;
-  bool too_late{};  // Older than the history.
-  double nis{};     // Squared normalised innovation; 0 where it was not computed.
-  int dimension{};
 };
 
 class Localizer {
@@ -48,37 +39,30 @@ class Localizer {
   void predict(const hal::ImuSample& sample);
   // Heading comes from the gyro for the time that its samples cover, from the wheels otherwise.
   // Reports of no travel tell the gyro's bias and add no uncertainty.
-  void predict(const hal::WheelTravel& travel) { add(travel); }
+  void predict(const hal::WheelTravel& travel);
   Gate correct(const hal::GnssFix& fix);
 
-  hal::Pose2 pose() const { return filter_.pose(); }                   // Heading in (-pi, pi].
-  Eigen::Matrix3d covariance() const { return filter_.covariance(); }  // Of (x, y, heading), in W.
-  Eigen::Isometry3d T_W_B() const { return filter_.T_W_B(); }          // With slope.
+  // What is asked is first brought up to date: not from two threads at once.
+  hal::Pose2 pose() const { return settled().filter().pose(); }  // Heading in (-pi, pi].
+  // Of (x, y, heading), in W.
+  Eigen::Matrix3d covariance() const { return settled().filter().covariance(); }
+  Eigen::Isometry3d T_W_B() const { return settled().filter().T_W_B(); }  // With slope.
   // At a stamp within the history; before it the oldest pose known, after it the last speed goes
   // on for at most half a second.
-  hal::Pose2 pose_at(hal::Time stamp) const;
-  double gyro_bias_radps() const { return filter_.gyro_bias_radps().z(); }
-  bool standing() const { return filter_.standing(); }
+  hal::Pose2 pose_at(hal::Time stamp) const { return settled().pose_at(stamp); }
+  double gyro_bias_radps() const { return settled().filter().gyro_bias_radps().z(); }
+  bool standing() const { return settled().filter().standing(); }
 
   std::vector<LocalizerFault> faults() const;
 
  private:
-  struct Entry {
-    hal::Time stamp;
-    LocalizerEvent event;
-    LocalizerFilter after;
-  };
-
-  std::list<Entry>::iterator keep(std::list<Entry>::const_iterator before, hal::Time stamp,
-                                  const LocalizerEvent& event);
-  void forget(hal::Time now);
+  const LocalizerHistory& settled() const;
 
   LocalizerConfig config_;
-  std::list<Entry> final_;  // One: the filter before the first entry.
-  std::optional<hal::Time> final_until_;
-  std::list<Entry> history_;
-  std::list<Entry> spare_;  // Forgotten: entries are large, and come and go all the time.
-  LocalizerFilter filter_;  // After the last entry.
+  mutable LocalizerHistory history_;
+  // A travel report that waits for the inertial sample of its stamp, which goes first and often
+  // comes just after it: together they are done once.
+  mutable std::optional<hal::WheelTravel> waiting_;
 };
 
 // Where something on the body is: T_W_B from the localizer, its mount on the pan axis and the pan
