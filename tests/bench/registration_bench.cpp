@@ -1,16 +1,18 @@
 // Registration of two scans of 70,000 points, made ready and brought together, beside plain
-// point-to-point ICP on the same clouds, thinned alike; and one localizer step.
+// point-to-point ICP on the same clouds, thinned alike; and the localizer's steps.
 #include <benchmark/benchmark.h>
 
 #include <Eigen/LU>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <list>
 #include <numbers>
 
 #include "nav/localizer.hpp"
 #include "nav/registration/registration.hpp"
 #include "tests/support/random_site.hpp"
+#include "tests/support/whole_covariance.hpp"
 
 namespace {
 
@@ -117,6 +119,124 @@ void localizer_step_by_matrix_product(benchmark::State& state) {
     benchmark::DoNotOptimize(P.data());
   }
 }
+
+// As robots tell it: a travel report, then the inertial sample of its stamp, which belongs before
+// it; every tenth time a fix in between.
+template <class Told>
+void tell(Told& told, double& time_s, int& count) {
+  time_s += 0.02;
+  const hal::Time stamp = hal::Time{} + hal::from_seconds(time_s);
+  told.travel({stamp, 0.02, 0.02});
+  if (++count % 10 == 0)
+    told.event(nav::GnssPosition{stamp, {0.02 * count, 0}, 4e-4 * Eigen::Matrix2d::Identity()});
+  told.event(nav::InertialSample{stamp, {0, 0, 1e-4}});
+}
+
+struct ToldLocalizer {
+  nav::Localizer localizer{{}, {}, Eigen::Matrix3d::Identity() * 0.01};
+  void travel(const hal::WheelTravel& travel) { localizer.predict(travel); }
+  void event(const nav::LocalizerEvent& event) { localizer.add(event); }
+};
+
+// Keeps the filter after every event.
+struct ToldPlainHistory {
+  struct Entry {
+    nav::LocalizerEvent event;
+    nav::LocalizerFilter after;
+  };
+  nav::LocalizerConfig config;
+  std::list<Entry> history{
+      {nav::InertialSample{}, {config, {}, Eigen::Matrix3d::Identity() * 0.01}}};
+  nav::LocalizerFilter filter = history.front().after;
+
+  void travel(const hal::WheelTravel& travel) { event(travel); }
+  void event(const nav::LocalizerEvent& event) {
+    auto at = history.end();
+    while (nav::goes_before(event, std::prev(at)->event)) --at;
+    filter = std::prev(at)->after;
+    filter.apply(config, event);
+    history.insert(at, {event, filter});
+    for (; at != history.end(); ++at) {
+      filter.apply(config, at->event);
+      at->after = filter;
+    }
+    const hal::Time oldest =
+        nav::stamp_of(history.back().event) - hal::from_seconds(config.history_s);
+    while (nav::stamp_of(history.front().event) < oldest) history.pop_front();
+  }
+};
+
+template <class Told>
+void localizer_told_to(benchmark::State& state) {
+  Told told;
+  double time_s = 0;
+  int count = 0;
+  for (auto _ : state) tell(told, time_s, count);
+}
+void localizer_told(benchmark::State& state) {
+  localizer_told_to<ToldLocalizer>(state);
+}
+void localizer_told_by_plain_history(benchmark::State& state) {
+  localizer_told_to<ToldPlainHistory>(state);
+}
+BENCHMARK(localizer_told)->Unit(benchmark::kMicrosecond);
+BENCHMARK(localizer_told_by_plain_history)->Unit(benchmark::kMicrosecond);
+
+// The filter's arithmetic for a travel report and for a fix, beside products of whole matrices.
+nav::Motion some_motion() {
+  nav::Motion motion = nav::Motion::Constant(0.01);
+  motion.bottomLeftCorner<3, 3>().setZero();
+  motion.middleCols<2>(3).setZero();
+  return motion;
+}
+void covariance_carry(benchmark::State& state) {
+  nav::ErrorMatrix P = nav::ErrorMatrix::Identity();
+  const nav::Motion motion = some_motion();
+  for (auto _ : state) {
+    P.setIdentity();
+    nav::carry(P, motion, false);
+    benchmark::DoNotOptimize(P.data());
+    benchmark::ClobberMemory();
+  }
+}
+void covariance_carry_by_whole_matrices(benchmark::State& state) {
+  nav::ErrorMatrix P = nav::ErrorMatrix::Identity();
+  const nav::Motion motion = some_motion();
+  for (auto _ : state) {
+    P.setIdentity();
+    support::carry_whole(P, motion);
+    benchmark::DoNotOptimize(P.data());
+    benchmark::ClobberMemory();
+  }
+}
+nav::Measurement<2> some_fix() {
+  nav::Measurement<2> fix{nav::ErrorColumns<2>::Zero(), {0.01, 0.02}, Eigen::Matrix2d::Identity()};
+  fix.Ht(0, 0) = fix.Ht(1, 1) = 1;
+  fix.Ht(11, 0) = fix.Ht(12, 1) = 0.01;
+  return fix;
+}
+void covariance_fix(benchmark::State& state) {
+  nav::ErrorMatrix P = nav::ErrorMatrix::Identity();
+  const auto fix = some_fix();
+  for (auto _ : state) {
+    const auto expected = nav::expected<2>(P, fix.Ht);
+    benchmark::DoNotOptimize(nav::squared(fix, expected));
+    benchmark::DoNotOptimize(nav::learn(P, fix, expected).error.data());
+  }
+}
+void covariance_fix_by_whole_matrices(benchmark::State& state) {
+  nav::ErrorMatrix P = nav::ErrorMatrix::Identity();
+  const auto fix = some_fix();
+  support::Whole whole{fix.Ht, fix.innovation, fix.R, {}, {}};
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(whole.squared(P));
+    benchmark::DoNotOptimize(whole.learn(P).data());
+  }
+}
+BENCHMARK(covariance_carry);
+BENCHMARK(covariance_carry_by_whole_matrices);
+BENCHMARK(covariance_fix);
+BENCHMARK(covariance_fix_by_whole_matrices);
 BENCHMARK(localizer_step)->Arg(0)->Arg(1)->Unit(benchmark::kMicrosecond);
 BENCHMARK(localizer_step_by_matrix_product)->Unit(benchmark::kMicrosecond);
 
