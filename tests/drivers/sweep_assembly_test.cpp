@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <numbers>
+
+#include "hal/pan_fan.hpp"
 
 namespace drivers {
 namespace {
@@ -228,6 +231,13 @@ TEST(SweepAssembly, AMountAngleThatIsWrongMovesWalls) {
   EXPECT_GT(worst_off_the_walls(sweep.cloud), 0.01);
 }
 
+// The fan is what is kept of a scan's beams.
+bool is_told_by_its_fan(const hal::ScanCloud& cloud) {
+  const auto beams = cloud.fan ? hal::beams_of(*cloud.fan) : std::vector<hal::Beam>();
+  return beams.size() == cloud.beams.size() &&
+         std::memcmp(beams.data(), cloud.beams.data(), beams.size() * sizeof(hal::Beam)) == 0;
+}
+
 TEST(SweepAssembly, LostProfilesLeaveColumnsThatClaimNothing) {
   const auto plan = plan_sweep(field(), lms1xx(), looking_up().T_P_L());
   Truth truth;
@@ -243,6 +253,7 @@ TEST(SweepAssembly, LostProfilesLeaveColumnsThatClaimNothing) {
   EXPECT_LT(worst_off_the_walls(sweep.cloud), 1e-5);
   EXPECT_LT(worst_off_the_pattern_rad(sweep.cloud), 0.5 * kDeg);
   EXPECT_EQ(sweep_problem(sweep.quality, plan, {}), "");
+  EXPECT_TRUE(is_told_by_its_fan(sweep.cloud));
 }
 
 TEST(SweepAssembly, CountsProfilesThatAreMissingAtTheEnds) {
@@ -292,6 +303,7 @@ TEST(SweepAssembly, StopsMakeAScanToo) {
   EXPECT_TRUE(std::isnan(sweep.cloud.ranges_m[17 * plan.rows]));
   EXPECT_LT(worst_off_the_walls(sweep.cloud), 1e-5);
   EXPECT_LT(worst_off_the_pattern_rad(sweep.cloud), 1e-6);
+  EXPECT_TRUE(is_told_by_its_fan(sweep.cloud));
 }
 
 TEST(SweepQuality, NamesTheLimitThatBreaks) {
