@@ -157,7 +157,8 @@ class Survey {
   void redo(const StationReplaced& replaced);
   // In survey_replace.cpp.
   hal::Task<void> replace(std::size_t task, int dropped);
-  planning::Replacements find_instead(std::size_t task, int dropped) const;
+  planning::Replacements find_instead(std::size_t task, int dropped,
+                                      const Eigen::Vector2d& here_m) const;
   std::vector<std::vector<planning::WallPiece>> walls_kept(std::size_t task) const;
   void add_station(std::size_t task, std::string name, planning::Station station);
   void note_instead(const StationReplaced& replaced);

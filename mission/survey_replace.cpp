@@ -37,13 +37,13 @@ std::vector<std::vector<planning::WallPiece>> Survey::walls_kept(std::size_t t) 
   return kept;
 }
 
-planning::Replacements Survey::find_instead(std::size_t t, int dropped) const {
+planning::Replacements Survey::find_instead(std::size_t t, int dropped,
+                                            const Eigen::Vector2d& here_m) const {
   const AreaPlan& plan = record_.plans[t];
   const planning::SensorLimits limits = sensor_limits(config_.robot.scanner);
-  const auto can_be_reached =
-      [&, here_m = Eigen::Vector2d(pilot_.pose().position_m)](const planning::Candidate& at) {
-        return roads_[t].roadmap().route(here_m, nav::to_m(at.position)).has_value();
-      };
+  const auto can_be_reached = [&](const planning::Candidate& at) {
+    return roads_[t].roadmap().route(here_m, nav::to_m(at.position)).has_value();
+  };
   const planning::LostStation lost{
       .sees = plan.cover.stations[static_cast<std::size_t>(dropped)].sees,
       .kept = walls_kept(t),
@@ -56,7 +56,9 @@ planning::Replacements Survey::find_instead(std::size_t t, int dropped) const {
 
 hal::Task<void> Survey::replace(std::size_t t, int dropped) {
   planning::Replacements found;
-  const std::function<void()> look = [&] { found = find_instead(t, dropped); };
+  const std::function<void()> look = [&, here_m = Eigen::Vector2d(pilot_.pose().position_m)] {
+    found = find_instead(t, dropped, here_m);
+  };
   co_await parts_.compute.run(look);
   StationReplaced replaced{.area = record_.plans[t].area.name,
                            .name = station_name(record_.plans[t], dropped),

@@ -51,14 +51,6 @@ void Localizer::predict(const hal::ImuSample& sample) {
   add(InertialSample{sample.stamp, {0, 0, sample.yaw_rate_radps}, {}});
 }
 
-void Localizer::predict(const hal::WheelTravel& travel) {
-  settled();
-  if (history_.ends_with(travel))
-    waiting_ = travel;
-  else
-    history_.add(travel);
-}
-
 Gate Localizer::correct(const hal::GnssFix& fix) {
   if (!(fix.sigma_m >= 0)) return Gate::rejected;
   return add(GnssPosition{fix.stamp, fix.position_m,
@@ -67,23 +59,14 @@ Gate Localizer::correct(const hal::GnssFix& fix) {
 }
 
 Correction Localizer::add(const LocalizerEvent& event) {
-  // Of the same stamp: so that whether it is too late does not depend on what waits.
-  const bool first = waiting_ && std::holds_alternative<InertialSample>(event) &&
-                     stamp_of(event) == waiting_->stamp;
-  if (!first) settled();
   return history_.add(event);
-}
-
-const LocalizerHistory& Localizer::settled() const {
-  if (waiting_) history_.add(*std::exchange(waiting_, {}));
-  return history_;
 }
 
 std::vector<LocalizerFault> Localizer::faults() const {
   std::vector<LocalizerFault> faults;
   for (std::size_t i = 0; i < kSources; ++i) {
     const auto source = static_cast<Source>(i);
-    const RefusalStreak& streak = settled().filter().refusals(source);
+    const RefusalStreak& streak = history_.filter().refusals(source);
     if (streak.count < config_.streak_fault ||
         hal::seconds(streak.last - streak.first) < config_.streak_fault_s)
       continue;

@@ -39,30 +39,24 @@ class Localizer {
   void predict(const hal::ImuSample& sample);
   // Heading comes from the gyro for the time that its samples cover, from the wheels otherwise.
   // Reports of no travel tell the gyro's bias and add no uncertainty.
-  void predict(const hal::WheelTravel& travel);
+  void predict(const hal::WheelTravel& travel) { add(travel); }
   Gate correct(const hal::GnssFix& fix);
 
-  // What is asked is first brought up to date: not from two threads at once.
-  hal::Pose2 pose() const { return settled().filter().pose(); }  // Heading in (-pi, pi].
+  hal::Pose2 pose() const { return history_.filter().pose(); }  // Heading in (-pi, pi].
   // Of (x, y, heading), in W.
-  Eigen::Matrix3d covariance() const { return settled().filter().covariance(); }
-  Eigen::Isometry3d T_W_B() const { return settled().filter().T_W_B(); }  // With slope.
+  Eigen::Matrix3d covariance() const { return history_.filter().covariance(); }
+  Eigen::Isometry3d T_W_B() const { return history_.filter().T_W_B(); }  // With slope.
   // At a stamp within the history; before it the oldest pose known, after it the last speed goes
   // on for at most half a second.
-  hal::Pose2 pose_at(hal::Time stamp) const { return settled().pose_at(stamp); }
-  double gyro_bias_radps() const { return settled().filter().gyro_bias_radps().z(); }
-  bool standing() const { return settled().filter().standing(); }
+  hal::Pose2 pose_at(hal::Time stamp) const { return history_.pose_at(stamp); }
+  double gyro_bias_radps() const { return history_.filter().gyro_bias_radps().z(); }
+  bool standing() const { return history_.filter().standing(); }
 
   std::vector<LocalizerFault> faults() const;
 
  private:
-  const LocalizerHistory& settled() const;
-
   LocalizerConfig config_;
-  mutable LocalizerHistory history_;
-  // A travel report that waits for the inertial sample of its stamp, which goes first and often
-  // comes just after it: together they are done once.
-  mutable std::optional<hal::WheelTravel> waiting_;
+  LocalizerHistory history_;
 };
 
 // Where something on the body is: T_W_B from the localizer, its mount on the pan axis and the pan

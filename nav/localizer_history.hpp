@@ -33,11 +33,6 @@ class LocalizerHistory {
                    const Eigen::Matrix3d& covariance);
 
   Correction add(const LocalizerEvent& event);
-  // Whether it belongs after all that was told.
-  bool ends_with(const LocalizerEvent& event) const {
-    const auto& last = blocks_.back().entries;
-    return last.empty() || !goes_before(event, last.back().event);
-  }
   const LocalizerFilter& filter() const { return filters_[now_]; }  // After the last event.
   // As nav::Localizer has it.
   hal::Pose2 pose_at(hal::Time stamp) const;

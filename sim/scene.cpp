@@ -19,10 +19,6 @@ void require(RTCDevice device) {
     throw std::runtime_error("Embree failed with error " + std::to_string(static_cast<int>(error)));
 }
 
-struct DeviceRelease {
-  void operator()(RTCDeviceTy* device) const { rtcReleaseDevice(device); }
-};
-
 RTCGeometry make_geometry(RTCDevice device, const Mesh& mesh, const Eigen::Vector3d& W_origin_m) {
   const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
@@ -115,6 +111,10 @@ bool visit_triangle(RTCPointQueryFunctionArguments* arguments) {
 
 }  // namespace
 
+void Scene::Release::operator()(RTCDeviceTy* device) const {
+  rtcReleaseDevice(device);
+}
+
 void Scene::Release::operator()(RTCSceneTy* scene) const {
   rtcReleaseScene(scene);
 }
@@ -122,15 +122,15 @@ void Scene::Release::operator()(RTCSceneTy* scene) const {
 Scene::Scene(const Mesh& mesh) : W_vertices_m_(mesh.W_vertices_m), triangles_(mesh.triangles) {
   if (mesh.triangles.empty()) throw std::invalid_argument("a scene needs triangles");
   W_origin_m_ = mesh.bounds_m().center();
-  const std::unique_ptr<RTCDeviceTy, DeviceRelease> device(rtcNewDevice(kDeviceConfig));
-  if (!device) require(nullptr);
-  scene_.reset(rtcNewScene(device.get()));
+  device_.reset(rtcNewDevice(kDeviceConfig));
+  if (!device_) require(nullptr);
+  scene_.reset(rtcNewScene(device_.get()));
   rtcSetSceneFlags(scene_.get(), RTC_SCENE_FLAG_ROBUST);
-  const RTCGeometry geometry = make_geometry(device.get(), mesh, W_origin_m_);
+  const RTCGeometry geometry = make_geometry(device_.get(), mesh, W_origin_m_);
   rtcAttachGeometry(scene_.get(), geometry);
   rtcReleaseGeometry(geometry);
   rtcCommitScene(scene_.get());
-  require(device.get());
+  require(device_.get());
 }
 
 std::optional<Hit> Scene::cast(const Eigen::Vector3d& W_from, const Eigen::Vector3d& W_direction,

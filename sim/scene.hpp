@@ -11,6 +11,7 @@
 
 #include "sim/mesh.hpp"
 
+struct RTCDeviceTy;
 struct RTCSceneTy;
 
 namespace sim {
@@ -53,13 +54,17 @@ class Scene {
   RTCSceneTy* embree() const { return scene_.get(); }
 
  private:
+  // The scene before its device: Embree reads the device once more after a scene that was the last
+  // to hold it.
   struct Release {
+    void operator()(RTCDeviceTy* device) const;
     void operator()(RTCSceneTy* scene) const;
   };
 
   Eigen::Vector3d W_origin_m_;
   std::vector<Eigen::Vector3d> W_vertices_m_;
   std::vector<std::array<std::uint32_t, 3>> triangles_;
+  std::unique_ptr<RTCDeviceTy, Release> device_;
   std::unique_ptr<RTCSceneTy, Release> scene_;
 };
 
