@@ -21,7 +21,8 @@ bool is_hopeless(boost::system::error_code error) {
   return error == errc::invalid_argument || error == errc::argument_out_of_domain;
 }
 
-// Of what is kept of one: what was measured, and its points in W.
+// Of what is kept of one at most: what was measured (less where its beams are a fan), and its
+// points in W.
 std::uint64_t scan_bytes(const ScannerConfig& scanner) {
   constexpr double kBeamBytes = 28, kPointBytes = 12;
   const double columns = scanner.fov_deg / scanner.azimuth_step_deg + 1;

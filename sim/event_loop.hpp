@@ -11,7 +11,8 @@ namespace sim {
 // Runs handlers in exactly the order in which a boost::asio::io_context on one thread does, at a
 // fraction of its cost for each, and handlers are what a mission of hours consists of. What is the
 // operating system's (sockets, timers, signals) needs an io_context and cannot be waited for here.
-// Handlers that are left when it ends are destroyed, which unwinds their coroutines.
+// Handlers that are left when it ends are destroyed, which unwinds their coroutines. As many wait
+// as coroutines are ready: who runs it bounds how many may run while time stands still (SimClock).
 class EventLoop final : public boost::asio::execution_context {
  public:
   EventLoop() = default;
