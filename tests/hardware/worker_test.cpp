@@ -77,6 +77,33 @@ TEST(Worker, IsWaitedForByACallerThatIsCancelled) {
   EXPECT_FALSE(error);
 }
 
+// A cancellation must not go to the worker's thread, where it would wait behind other work until
+// the caller is long gone.
+TEST(Worker, IsNotToldOfACancellationWhenTheCallerIsGone) {
+  Loop loop;
+  std::atomic<bool> gone = false;
+  bool other_ended = false;
+  const auto begin_other_work = [&] {
+    const std::function<void()> work = [&] {
+      while (!gone) std::this_thread::sleep_for(1ms);
+    };
+    boost::asio::co_spawn(loop.io, loop.worker.run(work),
+                          [&](std::exception_ptr) { other_ended = true; });
+  };
+  const auto error = loop.run([&]() -> hal::Task<void> {
+    boost::asio::cancellation_signal cancel;
+    boost::asio::co_spawn(loop.io, loop.worker.run([] {}),
+                          boost::asio::bind_cancellation_slot(
+                              cancel.slot(), [&](std::exception_ptr) { gone = true; }));
+    std::this_thread::sleep_for(50ms);  // It ends, which the loop does not know yet.
+    begin_other_work();
+    cancel.emit(boost::asio::cancellation_type::terminal);
+    while (!other_ended) co_await loop.clock.sleep_for(1ms);
+  }());
+  EXPECT_FALSE(error);
+  EXPECT_TRUE(gone);
+}
+
 hal::Task<void> fail_after(hal::Clock& clock, hal::Duration pause) {
   co_await clock.sleep_for(pause);
   throw std::runtime_error("it failed");
