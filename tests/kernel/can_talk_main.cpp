@@ -1,7 +1,8 @@
-// can_talk LINK: a CAN link of ours as lines of text, for tests against programs that we did not
-// write. Says "frame 123#DEADBEEF" for what it hears, "lost" and "back", "trouble NAME" or "trouble
-// none" when that changes; sends what stands on standard input, one frame a line, as cansend takes
-// it, and says "sent FRAME" or "failed FRAME: WHY". Ends with its input.
+// can_talk LINK [--agilex]: a CAN link of ours as lines of text, for tests against programs that we
+// did not write; with what the AgileX driver needs to hear, or with everything. Says "frame
+// 123#DEADBEEF" for what it hears, "lost" and "back", "trouble NAME" or "trouble none" when that
+// changes; sends what stands on standard input, one frame a line, as cansend takes it, and says
+// "sent FRAME" or "failed FRAME: WHY". Ends with its input.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -15,9 +16,12 @@
 #include <charconv>
 #include <cstdio>
 #include <memory>
+#include <span>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
+#include "drivers/agilex_drive.hpp"
 #include "drivers/gs_usb.hpp"
 #include "drivers/real_clock.hpp"
 #include "drivers/socketcan.hpp"
@@ -115,7 +119,7 @@ struct Talk {
   hal::Task<void> all() { co_await hal::first_of(speak(), hear_and_watch()); }
 };
 
-int run(const std::string& text) {
+int run(const std::string& text, std::span<const hal::CanFilter> filters) {
   const auto parsed = drivers::parse_link_address(text);
   if (const auto* error = std::get_if<drivers::AddressError>(&parsed))
     throw std::invalid_argument(error->what);
@@ -126,7 +130,9 @@ int run(const std::string& text) {
   std::unique_ptr<drivers::GsUsbBus> usb;
   std::unique_ptr<Talk> talk;
   if (const auto* interface = std::get_if<drivers::CanAddress>(&address)) {
-    can = std::make_unique<drivers::SocketCan>(*interface, io.get_executor(), clock);
+    can = std::make_unique<drivers::SocketCan>(
+        *interface, io.get_executor(), clock,
+        std::vector<hal::CanFilter>(filters.begin(), filters.end()));
     talk = std::make_unique<Talk>(*can, *can, clock, io);
   } else if (const auto* adapter = std::get_if<drivers::GsUsbAddress>(&address)) {
     usb = std::make_unique<drivers::GsUsbBus>(io.get_executor(), clock);
@@ -152,12 +158,14 @@ int run(const std::string& text) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
-    fmt::print(stderr, "can_talk LINK: such as can:vcan0\n");
+  const bool agilex = argc == 3 && std::string_view(argv[2]) == "--agilex";
+  if (argc != (agilex ? 3 : 2)) {
+    fmt::print(stderr, "can_talk LINK [--agilex]: such as can:vcan0\n");
     return 2;
   }
   try {
-    return run(argv[1]);
+    return run(argv[1],
+               agilex ? drivers::AgilexDrive::filters() : std::span<const hal::CanFilter>());
   } catch (const std::exception& error) {
     fmt::print(stderr, "can_talk: {}\n", error.what());
     return 2;
