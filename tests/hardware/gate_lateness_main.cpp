@@ -20,6 +20,7 @@
 #include "mission/main_realtime.hpp"
 #include "mission/main_run.hpp"
 #include "tests/hardware/away.hpp"
+#include "tests/support/well_drive.hpp"
 
 namespace {
 
@@ -55,27 +56,6 @@ struct Lateness {
 double ms(hal::Duration span) {
   return 1e3 * hal::seconds(span);
 }
-
-// Always well, and obeys: what is late here is nobody's but the gate's.
-class WillingDrive final : public hal::GuardedDrive {
- public:
-  explicit WillingDrive(hal::Clock& clock) : clock_(clock) {}
-  hal::Task<hal::Result<void>> command(hal::Twist) override { co_return hal::Result<void>{}; }
-  hal::Task<hal::Result<hal::WheelTravel>> next_travel() override {
-    co_await clock_.sleep_for(1h);
-    co_return hal::WheelTravel{};
-  }
-  hal::DriveStatus status() const override {
-    hal::DriveStatus status;
-    status.reported_at = clock_.now();
-    status.silent = status.held = false;
-    return status;
-  }
-  hal::Task<hal::Result<hal::Duration>> prove_timeout() override { co_return hal::Duration(500ms); }
-
- private:
-  hal::Clock& clock_;
-};
 
 // Sees on each processor, before everything else there, when the machine takes it away.
 class Sentinels {
@@ -125,7 +105,7 @@ void run_gate(hal::Duration during, std::vector<Cycle>& cycles, std::string& ref
     if (!refusal.empty()) refused += (refused.empty() ? "" : "; ") + refusal;
   boost::asio::io_context io{1};
   drivers::RealClock clock;
-  WillingDrive drive(clock);
+  test::WellDrive drive(clock);
   const hal::Time from = clock.now() + kSettles, until = from + during;
   cycles.reserve(static_cast<std::size_t>(during / mission::kGatePeriod) + 10);
   hal::Time due{};

@@ -4,6 +4,7 @@
 #include "sim/cia402_unit.hpp"
 #include "tests/drivers/allocations.hpp"
 #include "tests/mission/gated_rig.hpp"
+#include "tests/support/well_drive.hpp"
 
 namespace gate_test {
 namespace {
@@ -118,33 +119,12 @@ TEST_F(GatedPair, StaysWhenItsStoInputWasOpenedAndClosed) {
 
 // --- The loop itself.
 
-// Always well, and obeys nobody.
-class QuietDrive final : public hal::GuardedDrive {
- public:
-  explicit QuietDrive(hal::Clock& clock) : clock_(clock) {}
-  hal::Task<hal::Result<void>> command(hal::Twist) override { co_return hal::Result<void>{}; }
-  hal::Task<hal::Result<hal::WheelTravel>> next_travel() override {
-    co_await clock_.sleep_for(1h);
-    co_return hal::WheelTravel{};
-  }
-  hal::DriveStatus status() const override {
-    hal::DriveStatus status;
-    status.reported_at = clock_.now();
-    status.silent = status.held = false;
-    return status;
-  }
-  hal::Task<hal::Result<hal::Duration>> prove_timeout() override { co_return hal::Duration(500ms); }
-
- private:
-  hal::Clock& clock_;
-};
-
 // What a loop allocates in a virtual second, once it runs.
 template <class Loop>
 std::uint64_t allocated_by(Loop loop) {
   boost::asio::io_context io;
   sim::SimClock clock(io);
-  QuietDrive drive(clock);
+  test::WellDrive drive(clock);
   GatedDrive::Config config;
   config.safety = [] {
     hal::SafetyInputs released;
@@ -175,7 +155,7 @@ TEST(GatedDriveLoop, AllocatesNothingInVirtualTime) {
 TEST(GatedDriveLoop, AllocatesNothingInRealTime) {
   boost::asio::io_context io{1};
   drivers::RealClock clock;
-  QuietDrive drive(clock);
+  test::WellDrive drive(clock);
   GatedDrive::Config config;
   int cycles = 0;
   std::uint64_t before = 0, after = 0;
