@@ -37,26 +37,42 @@ void CastAhead::set_arc(const MirrorArc& arc, hal::Duration arc_time) {
   key_.reset();
 }
 
-bool CastAhead::has(std::uint64_t number, std::uint64_t every) const {
-  return every == every_ && number >= turns_.front().number && number <= turns_.back().number &&
-         (number - turns_.front().number) % every == 0;
+bool CastAhead::Chunk::has(std::uint64_t number) const {
+  if (turns.empty()) return false;
+  const std::uint64_t first = turns.front().number;
+  const std::uint64_t every = turns.size() > 1 ? turns[1].number - first : 1;
+  return number >= first && number <= turns.back().number && (number - first) % every == 0;
 }
 
 std::span<const float> CastAhead::of(std::uint64_t number, std::uint64_t every) {
   world_.advance(clock_.now());
   const auto& placed = world_.placed_scanner();
   const Key key{pan_.changes(), placed ? *placed : world_.robot()};
-  const bool as_foreseen = key_ && *key_ == key;
-  if (!as_foreseen || !has(number, every)) {
-    const std::size_t least = world_.moving() ? kChunkMoving : kChunkMin;
-    chunk_ = as_foreseen ? std::min(2 * chunk_, kChunkMax) : least;
+  const bool as_foreseen = key_ && *key_ == key && every == every_;
+  if (!as_foreseen || !now_.has(number)) {
     every_ = every;
     key_ = key;
-    cast(number);
+    renew(number, as_foreseen);
   }
-  const std::size_t at = (number - turns_.front().number) / every_;
-  const auto ranges_m = std::span<const float>(ranges_m_).subspan(at * arc_.beams, arc_.beams);
-  return world_.people().empty() ? ranges_m : with_people(turns_[at], ranges_m);
+  const std::size_t at = (number - now_.turns.front().number) / every_;
+  const auto ranges_m = std::span<const float>(now_.ranges_m).subspan(at * arc_.beams, arc_.beams);
+  return world_.people().empty() ? ranges_m : with_people(now_.turns[at], ranges_m);
+}
+
+// As foreseen, chunks get longer, and the next one is begun.
+void CastAhead::renew(std::uint64_t number, bool as_foreseen) {
+  if (as_foreseen && next_.has(number)) {
+    std::swap(now_, next_);
+  } else {
+    const std::size_t least = world_.moving() ? kChunkMoving : kChunkMin;
+    chunk_ = as_foreseen ? std::min(2 * chunk_, kChunkMax) : least;
+    begin(now_, number, config_.threads - 1);
+  }
+  caster_->finish();
+  next_.turns.clear();
+  if (!as_foreseen || config_.threads < 2) return;
+  chunk_ = std::min(2 * chunk_, kChunkMax);
+  begin(next_, now_.turns.back().number + every_, config_.threads - 1);
 }
 
 // People walk on while what stands was cast: they are put in as they are now.
@@ -93,16 +109,16 @@ void CastAhead::look_for_people(const MirrorTurn& turn) {
   }
 }
 
-void CastAhead::cast(std::uint64_t number) {
-  turns_.clear();
+void CastAhead::begin(Chunk& chunk, std::uint64_t number, int helpers) {
+  chunk.turns.clear();
   for (std::size_t i = 0; i < chunk_; ++i) {
     const std::uint64_t turn = number + i * every_;
     const hal::Time start = start_(turn);
-    turns_.push_back({turn, pan_.angle_rad(start), pan_.angle_rad(start + arc_time_)});
+    chunk.turns.push_back({turn, pan_.angle_rad(start), pan_.angle_rad(start + arc_time_)});
   }
-  ranges_m_.resize(chunk_ * arc_.beams);
-  caster_->cast(key_->at.T_W_S(world_.config().scanner.height_m), turns_, config_.threads,
-                ranges_m_);
+  chunk.ranges_m.resize(chunk_ * arc_.beams);
+  caster_->begin(key_->at.T_W_S(world_.config().scanner.height_m), chunk.turns, helpers,
+                 chunk.ranges_m);
   turns_cast_ += chunk_;
 }
 

@@ -1,6 +1,7 @@
 // The ranges of a turning mirror, cast in chunks before they are needed: as the pan axis will turn
 // and the robot will stand if nothing changes that. What turns out otherwise is thrown away, so the
-// ranges are always those of the latest truth.
+// ranges are always those of the latest truth. With several threads the next chunk is cast while
+// this one is asked for.
 #pragma once
 
 #include <functional>
@@ -43,8 +44,14 @@ class CastAhead {
     StandingPose at;
     bool operator==(const Key& other) const;
   };
-  bool has(std::uint64_t number, std::uint64_t every) const;
-  void cast(std::uint64_t number);
+  struct Chunk {
+    std::vector<MirrorTurn> turns;
+    std::vector<float> ranges_m;
+    bool has(std::uint64_t number) const;
+  };
+  void renew(std::uint64_t number, bool as_foreseen);
+  // Begins to cast those from `number` on.
+  void begin(Chunk& chunk, std::uint64_t number, int helpers);
   std::span<const float> with_people(const MirrorTurn& turn, std::span<const float> ranges_m);
   void look_for_people(const MirrorTurn& turn);
 
@@ -56,15 +63,15 @@ class CastAhead {
   MirrorArc arc_;
   hal::Duration arc_time_{};
   std::vector<Eigen::Vector3d> L_directions_;  // Of the arc's beams.
-  std::unique_ptr<ProfileCaster> caster_;
   std::optional<Key> key_;
-  std::vector<MirrorTurn> turns_;
-  std::vector<float> ranges_m_, among_people_m_;
+  Chunk now_, next_;  // The next one is being cast, if it has turns.
+  std::vector<float> among_people_m_;
   std::vector<Eigen::Vector3d> W_directions_;
   std::vector<double> to_people_m_;
   std::size_t chunk_ = 4;
   std::uint64_t every_ = 1;
   std::uint64_t turns_cast_{};
+  std::unique_ptr<ProfileCaster> caster_;  // Last: its threads write into the chunks.
 };
 
 }  // namespace sim

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "sim/parallel.hpp"
@@ -68,12 +70,16 @@ struct ProfileCaster::Impl {
   }
   void cast_still(const Eigen::Isometry3d& T_W_S, std::span<const MirrorTurn> turns,
                   std::span<float> ranges_m);
+  void cast_strip(const Eigen::Isometry3d& T_W_S, std::span<const MirrorTurn> turns,
+                  float* ranges_m) const;
 
   // What the beams meet from where turns were cast last with the pan axis standing: until either
   // turns, only the noise is another.
   Eigen::Isometry3d T_W_S_still;
   double pan_still_rad = 0;
   std::vector<Met> met_still;  // Empty: not cast yet.
+
+  std::unique_ptr<ChunkWork<std::function<void(std::size_t)>>> begun;
 };
 
 ProfileCaster::ProfileCaster(const Scene& scene, const ScannerModel& model, const MirrorArc& arc,
@@ -91,7 +97,8 @@ ProfileCaster::ProfileCaster(const Scene& scene, const ScannerModel& model, cons
                                       std::move(directions),
                                       {},
                                       0,
-                                      {}});
+                                      {},
+                                      nullptr});
 }
 
 ProfileCaster::~ProfileCaster() = default;
@@ -170,30 +177,50 @@ void ProfileCaster::Impl::cast_still(const Eigen::Isometry3d& T_W_S,
   }
 }
 
-void ProfileCaster::cast(const Eigen::Isometry3d& T_W_S, std::span<const MirrorTurn> turns,
-                         int threads, std::span<float> ranges_m) {
+// Up to kTile turns.
+void ProfileCaster::Impl::cast_strip(const Eigen::Isometry3d& T_W_S,
+                                     std::span<const MirrorTurn> turns, float* ranges_m) const {
+  const std::size_t beams = P_directions.size();
+  Strip one{*this, T_W_S, turns, {}, {}};
+  for (std::size_t i = 0; i < turns.size(); ++i) {
+    one.keys[i] = key(turns[i].number);
+    one.steps[i] =
+        PanTurn::of((turns[i].pan_end_rad - turns[i].pan_first_rad) / static_cast<double>(beams));
+  }
+  one.cast([&](std::uint32_t turn, std::uint32_t beam, const Met& met) {
+    ranges_m[turn * beams + beam] = reported_m(met, mix(one.keys[turn] + beam));
+  });
+}
+
+void ProfileCaster::begin(const Eigen::Isometry3d& T_W_S, std::span<const MirrorTurn> turns,
+                          int helpers, std::span<float> ranges_m) {
+  drop();
   const bool still = std::ranges::all_of(turns, [&](const MirrorTurn& turn) {
     return turn.pan_first_rad == turns.front().pan_first_rad &&
            turn.pan_end_rad == turn.pan_first_rad;
   });
   if (still) return impl_->cast_still(T_W_S, turns, ranges_m);
-  const std::size_t beams = impl_->P_directions.size();
-  for_each_chunk((turns.size() + kTile - 1) / kTile, threads, [&](std::size_t strip) {
+  const std::function<void(std::size_t)> cast_one = [=, &of = *impl_](std::size_t strip) {
     const std::size_t first = strip * kTile;
-    Impl::Strip one{*impl_,
-                    T_W_S,
-                    turns.subspan(first, std::min<std::size_t>(kTile, turns.size() - first)),
-                    {},
-                    {}};
-    for (std::size_t i = 0; i < one.turns.size(); ++i) {
-      one.keys[i] = impl_->key(one.turns[i].number);
-      one.steps[i] = PanTurn::of((one.turns[i].pan_end_rad - one.turns[i].pan_first_rad) /
-                                 static_cast<double>(beams));
-    }
-    one.cast([&](std::uint32_t turn, std::uint32_t beam, const Met& met) {
-      ranges_m[(first + turn) * beams + beam] = impl_->reported_m(met, mix(one.keys[turn] + beam));
-    });
-  });
+    const std::size_t count = std::min<std::size_t>(kTile, turns.size() - first);
+    of.cast_strip(T_W_S, turns.subspan(first, count), &ranges_m[first * of.P_directions.size()]);
+  };
+  impl_->begun = std::make_unique<ChunkWork<std::function<void(std::size_t)>>>(
+      (turns.size() + kTile - 1) / kTile, helpers, cast_one);
+}
+
+void ProfileCaster::finish() {
+  if (const auto begun = std::exchange(impl_->begun, nullptr)) begun->finish();
+}
+
+void ProfileCaster::drop() {
+  impl_->begun.reset();
+}
+
+void ProfileCaster::cast(const Eigen::Isometry3d& T_W_S, std::span<const MirrorTurn> turns,
+                         int threads, std::span<float> ranges_m) {
+  begin(T_W_S, turns, threads - 1, ranges_m);
+  finish();
 }
 
 }  // namespace sim

@@ -37,6 +37,12 @@ class ProfileCaster {
   // not depend on `threads`, nor on what was cast before. For one thread at a time.
   void cast(const Eigen::Isometry3d& T_W_S, std::span<const MirrorTurn> turns, int threads,
             std::span<float> ranges_m);
+  // The same in two steps: begun by `helpers` threads while this one does something else. One at a
+  // time; turns and ranges_m must stay until it is finished or dropped.
+  void begin(const Eigen::Isometry3d& T_W_S, std::span<const MirrorTurn> turns, int helpers,
+             std::span<float> ranges_m);
+  void finish();
+  void drop();
 
  private:
   struct Impl;
