@@ -8,6 +8,7 @@
 
 #include "mission/main_command_line.hpp"
 #include "mission/main_hardware.hpp"
+#include "mission/main_realtime.hpp"
 #include "mission/main_service.hpp"
 #include "mission/resume.hpp"
 
@@ -205,6 +206,7 @@ void add_options(mission::CommandLine& line, Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  mission::keep_memory();
   Options options;
   mission::CommandLine line(
       "Surveys a site: plans stations, tours them, takes next best views.",

@@ -1,10 +1,12 @@
 #include "mission/main_realtime.hpp"
 
 #include <fmt/format.h>
+#include <malloc.h>
 #include <sched.h>
 #include <sys/mman.h>
 
 #include <cerrno>
+#include <climits>
 #include <cstring>
 #include <fstream>
 
@@ -20,6 +22,11 @@ std::string because(const char* what, const char* permitted_by) {
 }
 
 }  // namespace
+
+void keep_memory() {
+  ::mallopt(M_MMAP_MAX, 0);  // Such blocks go back to the system at once.
+  ::mallopt(M_TRIM_THRESHOLD, INT_MAX);
+}
 
 // As it is first used: a survey reserves far more than it ever touches.
 std::string lock_memory() {

@@ -9,6 +9,11 @@
 
 namespace mission {
 
+// Memory that the program gives back stays with it for what it takes next, up to 2 GB, blocks of
+// any size on the main thread: scans come and go by a hundred megabytes, and to fault their pages
+// in anew takes longer than to fill them (a quarter of a simulated mission). At the start.
+void keep_memory();
+
 // No page that the program has used leaves memory again. Empty: done; else why not.
 std::string lock_memory();
 

@@ -6,6 +6,7 @@
 #include <iostream>
 #include <memory>
 
+#include "mission/main_realtime.hpp"
 #include "mission/plan_preview.hpp"
 #include "mission/progress.hpp"
 #include "tools/vantage_command.hpp"
@@ -79,6 +80,7 @@ std::filesystem::path folder_of(const RehearseOptions& options) {
 }
 
 int rehearse(const RehearseOptions& options) {
+  mission::keep_memory();
   const std::filesystem::path out = folder_of(options);
   mission::Prepared site = prepared(options.site, mission::WorldUse::world, options.model);
   if (!options.model.empty())

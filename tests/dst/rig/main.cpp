@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "mission/main_command_line.hpp"
+#include "mission/main_realtime.hpp"
 #include "tests/dst/rig/matrix.hpp"
 #include "tests/dst/rig/missions.hpp"
 #include "tests/dst/rig/soak.hpp"
@@ -94,6 +95,7 @@ int soak(std::uint64_t seed, double hours) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  mission::keep_memory();
   mission::CommandLine line(
       "Missions on devices that fail, and on a computer whose clock is set, whose disk fails and "
       "whose power is cut, in virtual time. A run that is cut is gone on with from what its disk "
