@@ -68,7 +68,8 @@ hal::Task<void> GatedDrive::cycle() {
 }
 
 hal::Twist GatedDrive::decide(hal::Time now) {
-  conditions_ = look(now);
+  const Conditions were = std::exchange(conditions_, look(now));
+  stops_ += (conditions_.bits() & latch::kStops) != 0 && (were.bits() & latch::kStops) == 0;
   if ((conditions_.bits() & kEndsProof) != 0) stopped_.notify();
   const Decision decision = supervise(supervisor_, conditions_, std::exchange(event_, Event::none));
   if (decision.mode != mode_ || decision.answer != Answer::none) on_decision(decision, conditions_);
@@ -261,8 +262,11 @@ hal::Task<void> GatedDrive::prove() {
   (void)co_await drive_.command(stand);
 }
 
+// What stops the robot while a scan is waited for wants a release of its own.
 hal::Task<void> GatedDrive::try_to_prove() {
+  const std::uint64_t stops = stops_;
   while (config_.scanning && config_.scanning()) co_await clock_.sleep_for(kGatePeriod);
+  if (stops != stops_) co_return;
   const auto took = co_await drive_.prove_timeout();
   proven_ = took.has_value();
   proof_failure_ = proven_ ? "" : refusal(took.error());

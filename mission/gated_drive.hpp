@@ -116,6 +116,7 @@ class GatedDrive final : public hal::Drive {
   int silent_cycles_ = 0;  // In a row.
   bool reset_was_ = false, release_asked_ = false, loaded_ = true, held_ = false;
   std::uint64_t holds_ = 0;  // That were asked for.
+  std::uint64_t stops_ = 0;  // How often something began to stop it.
   hal::Wake asked_, stopped_, released_;
   std::optional<FaultCode> stopped_by_;
   std::string proof_failure_;

@@ -338,6 +338,32 @@ TEST_F(GatedBase, EndsTheProofWhenTheEstopIsPressed) {
   EXPECT_LE(*zero_after(pressed) - pressed, mission::kGatePeriod + kFrameTime);
 }
 
+// A person pressed before the second stop, while a scan was taken: that press is none for it.
+TEST_F(GatedBase, DoesNotCreepForAPressFromBeforeAnotherStop) {
+  drive_off();
+  const auto be_silent_once = [this] {
+    faults.set(sim::parse_unit_fault("off").setting);
+    wait(3s);
+    faults.clear();
+    wait(3s);
+  };
+  be_silent_once();
+  ASSERT_EQ(gate->mode(), Mode::stopped);
+  scanning = true;
+  gate->ask_release();
+  wait(1s);
+  be_silent_once();
+  const hal::Time scanned = clock.now();
+  scanning = false;
+  wait(4s);
+  EXPECT_EQ(moving_after(scanned), 0);
+  EXPECT_EQ(gate->mode(), Mode::stopped);
+  EXPECT_THAT(gate->proof(), HasSubstr("something stopped the robot meanwhile"));
+  release();
+  EXPECT_NE(gate->mode(), Mode::stopped) << testing::PrintToString(told);
+  EXPECT_GT(moving_after(scanned), 0);
+}
+
 TEST_F(GatedBase, ProvesTheTimeoutAgainAfterTheDriveWasSilent) {
   drive_off();
   faults.set(sim::parse_unit_fault("off").setting);

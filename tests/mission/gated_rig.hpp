@@ -49,7 +49,8 @@ struct GatedBase : testing::Test, DriveBench {
   hal::Time planned_at{};
   bool plans = true;
   bool held = false;  // From the start.
-  int heard = 0;      // Of the gate, how often.
+  bool scanning = false;
+  int heard = 0;  // Of the gate, how often.
 
   void make(mission::Boot boot = mission::Boot::clean) {
     GatedDrive::Config config;
@@ -58,6 +59,7 @@ struct GatedBase : testing::Test, DriveBench {
     config.safety = [this] { return safety; };
     config.tell = [this](const std::string& what) { told.push_back(what); };
     config.starts_held = held;
+    config.scanning = [this] { return scanning; };
     config.alive = [this] { ++heard; };
     gate = std::make_unique<GatedDrive>(config, clock, drive);
     spawn(unit.run());
