@@ -135,6 +135,7 @@ int run(const std::string& text, std::span<const hal::CanFilter> filters) {
         std::vector<hal::CanFilter>(filters.begin(), filters.end()));
     talk = std::make_unique<Talk>(*can, *can, clock, io);
   } else if (const auto* adapter = std::get_if<drivers::GsUsbAddress>(&address)) {
+    if (!filters.empty()) throw std::invalid_argument(text + " does not filter");
     usb = std::make_unique<drivers::GsUsbBus>(io.get_executor(), clock);
     auto& channel = usb->channel(*adapter);
     talk = std::make_unique<Talk>(channel, channel, clock, io);
